@@ -1,0 +1,100 @@
+//! The one decision whether a ray meets a triangle. Every structure's answer is this answer.
+//!
+//! For a ray (o, d) and corners v0, v1, v2 let a_i = v_i - o. The three edge functions
+//!
+//! ```text
+//! e0 = d . (a1 x a2)     e1 = d . (a2 x a0)     e2 = d . (a0 x a1)
+//! ```
+//!
+//! are the signed volumes between the ray and the edges. The ray meets the triangle if no two of them have
+//! opposite signs and not all vanish (a ray within the triangle's plane misses it). The signs are exact:
+//! Shewchuk's adaptive predicates decide where f64 rounding could not. A ray through a shared edge therefore
+//! meets one of the two triangles, or both, never none; around a vertex likewise. This is watertight by
+//! construction, without a tie rule, at any scale and offset.
+//!
+//! The parameter is t = (a0 . N) / (d . N) with N = (v1 - v0) x (v2 - v0), in f64, in this order of operations:
+//! it decides which of two triangles is closer, equal values going to the smaller id.
+//!
+//! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, a_i = fl(v_i - o);
+//! for f32 input whose exponents differ by less than 29 that is exact.
+
+use glam::{DVec3, Vec3};
+use robust::{Coord3D, orient3d};
+
+use crate::{Light, Receiver, Triangles};
+
+/// An exact hit: parameters in f64.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExactHit {
+    /// Parameter along the ray.
+    pub t: f64,
+    /// Barycentric weight of corner 1.
+    pub u: f64,
+    /// Barycentric weight of corner 2.
+    pub v: f64,
+}
+
+fn coord(p: DVec3) -> Coord3D<f64> {
+    Coord3D { x: p.x, y: p.y, z: p.z }
+}
+
+/// d . (a x b) with the exact sign.
+#[inline]
+fn volume(a: DVec3, b: DVec3, d: DVec3) -> f64 {
+    const ZERO: Coord3D<f64> = Coord3D { x: 0.0, y: 0.0, z: 0.0 };
+    orient3d(coord(a), coord(b), coord(d), ZERO)
+}
+
+/// Whether the line o + t d meets the triangle, and where. The caller checks the range of `t`.
+///
+/// `None` for triangles without area and for rays within the triangle's plane.
+#[inline]
+pub fn hit(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<ExactHit> {
+    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    let (a0, a1, a2) = (v0 - origin, v1 - origin, v2 - origin);
+    let e0 = volume(a1, a2, dir);
+    let e1 = volume(a2, a0, dir);
+    if e0 * e1 < 0.0 {
+        return None;
+    }
+    let e2 = volume(a0, a1, dir);
+    let negative = e0 < 0.0 || e1 < 0.0 || e2 < 0.0;
+    let positive = e0 > 0.0 || e1 > 0.0 || e2 > 0.0;
+    if negative == positive {
+        return None;
+    }
+    let normal = (v1 - v0).cross(v2 - v0);
+    if normal == DVec3::ZERO {
+        return None;
+    }
+    let mut t = a0.dot(normal) / dir.dot(normal);
+    if !t.is_finite() {
+        // The plane is so steep that d . N rounds to zero: the corner's own distance is as good as any.
+        t = a0.dot(dir) / dir.length_squared();
+    }
+    let sum = e0 + e1 + e2;
+    Some(ExactHit { t, u: e1 / sum, v: e2 / sum })
+}
+
+/// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its
+/// error bound left out.
+#[inline]
+pub fn shadows(triangles: &Triangles, prim: u32, receiver: &Receiver, light: &Light) -> bool {
+    if prim == receiver.prim {
+        return false;
+    }
+    let corners = triangles.corners(prim);
+    match *light {
+        Light::Point(position) => {
+            // From the light, so that all rays of one light see the same rounded corners.
+            let origin = position.as_dvec3();
+            let dir = receiver.point - origin;
+            hit(origin, dir, corners)
+                .is_some_and(|h| h.t > 0.0 && (1.0 - h.t) * dir.length() > receiver.error)
+        }
+        Light::Directional(direction) => {
+            let dir = direction.as_dvec3();
+            hit(receiver.point, dir, corners).is_some_and(|h| h.t * dir.length() > receiver.error)
+        }
+    }
+}

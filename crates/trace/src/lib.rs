@@ -1,0 +1,25 @@
+//! Rays in, hits out.
+//!
+//! | rays | structure | source |
+//! |---|---|---|
+//! | eye rays of one camera | [`EyeGrid`] | HM08 §5.1 |
+//! | hard shadow rays of one light | [`PointLightGrid`] | HM08 §5.2 |
+//! | any ray | [`Bvh`] | general hierarchy |
+//! | any ray, by definition right | [`BruteForce`] | [`exact`] |
+//!
+//! All of them give the same answers, bit for bit: whether a ray meets a triangle is one exact decision
+//! ([`exact`]), and the vector kernels only filter the cases that are certain. No structure here ever fails or
+//! prints; builders take any floats and drop and count what is not finite or has no area.
+//!
+//! Positions are f32 in one local frame (the caller keeps its f64 origin). Units are the caller's.
+
+mod accel;
+pub mod brute;
+pub mod exact;
+mod ray;
+mod triangles;
+
+pub use accel::Accel;
+pub use brute::BruteForce;
+pub use ray::{Hit, Light, Ray, Receiver};
+pub use triangles::Triangles;
