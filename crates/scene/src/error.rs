@@ -14,6 +14,18 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A file that the scene refers to (a buffer, a texture, a material library) could not be read.
+    #[error("{}: {place}: cannot read {}: {source}", path.display(), target.display())]
+    Reference {
+        /// The scene file.
+        path: PathBuf,
+        /// What refers to it, for instance `image 3 "bark"`.
+        place: String,
+        /// The file referred to.
+        target: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// The file name has no known ending and the content no known magic.
     #[error("{}: not a scene format that is read here ({found}); known are .glb .gltf .obj .ply .stl", path.display())]
     UnknownFormat {
