@@ -1,1 +1,15 @@
-//! placeholder
+//! Ray tracing and visibility on the CPU, without ray tracing hardware: one structure for every camera and
+//! light, rebuilt every frame.
+//!
+//! Units: metres, radians, candela, lux; right-handed, +Y up; row 0 of every image on top; linear colours with
+//! the primaries of sRGB until the tone map.
+
+mod camera;
+mod error;
+mod film;
+pub mod tonemap;
+
+pub use camera::CameraFrame;
+pub use error::{Error, Result};
+pub use film::{Film, Layers, NO_ID, Sample, TileMut};
+pub use tonemap::{IntensityRange, ToneMap, ToneMapper};

@@ -1,0 +1,358 @@
+//! The picture as it is computed: linear colour and, on request, what each pixel saw.
+//!
+//! Layout: one vector a layer, row 0 on top, `width * height` entries; a layer that was not asked for is empty.
+//! Colour is f32 radiance with the primaries of sRGB. Cost: 12 bytes a pixel, plus 4 to 12 for each further layer.
+//!
+//! Tiles are written in parallel through [`Film::tiles_mut`], which splits every layer into disjoint row
+//! segments: no copy, no lock. Splitting costs some 10 ns for each row of each tile and layer.
+
+use glam::{Vec2, Vec3};
+
+use crate::Result;
+use crate::error::check_size;
+
+/// Which layers a film holds besides its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Layers {
+    /// Coverage, 0 where the background shows, 1 on surfaces.
+    pub alpha: bool,
+    /// View depth along the camera's forward axis, metres; infinite on the background.
+    pub depth: bool,
+    /// Length of the ray from its origin to the surface, metres; infinite on the background.
+    pub distance: bool,
+    /// World-space unit shading normal turned towards the viewer; zero on the background.
+    pub normal: bool,
+    /// Index of the object; [`NO_ID`] on the background.
+    pub object: bool,
+    /// Index of the triangle; [`NO_ID`] on the background.
+    pub prim: bool,
+    /// Barycentric weights of the triangle's corners 1 and 2; zero on the background.
+    pub bary: bool,
+}
+
+impl Layers {
+    /// Every layer.
+    pub const ALL: Self = Self {
+        alpha: true,
+        depth: true,
+        distance: true,
+        normal: true,
+        object: true,
+        prim: true,
+        bary: true,
+    };
+}
+
+/// The object and triangle index of pixels that see no surface.
+pub const NO_ID: u32 = u32::MAX;
+
+/// What one pixel saw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Linear colour.
+    pub color: Vec3,
+    /// See [`Layers::alpha`].
+    pub alpha: f32,
+    /// See [`Layers::depth`].
+    pub depth: f32,
+    /// See [`Layers::distance`].
+    pub distance: f32,
+    /// See [`Layers::normal`].
+    pub normal: Vec3,
+    /// See [`Layers::object`].
+    pub object: u32,
+    /// See [`Layers::prim`].
+    pub prim: u32,
+    /// See [`Layers::bary`].
+    pub bary: Vec2,
+}
+
+impl Sample {
+    /// A pixel that sees no surface.
+    pub fn background(color: Vec3) -> Self {
+        Self {
+            color,
+            alpha: 0.0,
+            depth: f32::INFINITY,
+            distance: f32::INFINITY,
+            normal: Vec3::ZERO,
+            object: NO_ID,
+            prim: NO_ID,
+            bary: Vec2::ZERO,
+        }
+    }
+}
+
+/// A picture with its layers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    layers: Layers,
+    /// Linear colour.
+    pub color: Vec<Vec3>,
+    /// See [`Layers::alpha`].
+    pub alpha: Vec<f32>,
+    /// See [`Layers::depth`].
+    pub depth: Vec<f32>,
+    /// See [`Layers::distance`].
+    pub distance: Vec<f32>,
+    /// See [`Layers::normal`].
+    pub normal: Vec<Vec3>,
+    /// See [`Layers::object`].
+    pub object: Vec<u32>,
+    /// See [`Layers::prim`].
+    pub prim: Vec<u32>,
+    /// See [`Layers::bary`].
+    pub bary: Vec<Vec2>,
+}
+
+impl Film {
+    /// A film that sees a black background everywhere.
+    ///
+    /// # Errors
+    /// [`crate::Error::ImageSize`] without pixels, or with more than 2^30 of them.
+    pub fn new(width: u32, height: u32, layers: Layers) -> Result<Self> {
+        let pixels = check_size(width, height)?;
+        let Sample {
+            color,
+            alpha,
+            depth,
+            distance,
+            normal,
+            object,
+            prim,
+            bary,
+        } = Sample::background(Vec3::ZERO);
+        Ok(Self {
+            width,
+            height,
+            layers,
+            color: vec![color; pixels],
+            alpha: layer(layers.alpha, alpha, pixels),
+            depth: layer(layers.depth, depth, pixels),
+            distance: layer(layers.distance, distance, pixels),
+            normal: layer(layers.normal, normal, pixels),
+            object: layer(layers.object, object, pixels),
+            prim: layer(layers.prim, prim, pixels),
+            bary: layer(layers.bary, bary, pixels),
+        })
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// The layers it holds.
+    pub fn layers(&self) -> Layers {
+        self.layers
+    }
+
+    /// Splits the film into tiles of at most `tile_width` x `tile_height` pixels, row by row from the top left;
+    /// those at the right and bottom edge are cut off. Each tile can be written on its own thread.
+    ///
+    /// # Panics
+    /// If a tile has no pixels.
+    pub fn tiles_mut(&mut self, tile_width: u32, tile_height: u32) -> Vec<TileMut<'_>> {
+        assert!(tile_width > 0 && tile_height > 0, "a tile without pixels");
+        let grid = TileGrid {
+            film_width: self.width as usize,
+            width: tile_width as usize,
+            height: tile_height,
+        };
+        let columns = self.width.div_ceil(tile_width);
+        let rows = self.height.div_ceil(tile_height);
+        let mut tiles = Vec::with_capacity((columns * rows) as usize);
+        for y in (0..self.height).step_by(tile_height as usize) {
+            for x in (0..self.width).step_by(tile_width as usize) {
+                let width = tile_width.min(self.width - x);
+                tiles.push(TileMut::new(x, y, width, tile_height.min(self.height - y)));
+            }
+        }
+        grid.split(&mut self.color, &mut tiles, |tile| &mut tile.color);
+        grid.split(&mut self.alpha, &mut tiles, |tile| &mut tile.alpha);
+        grid.split(&mut self.depth, &mut tiles, |tile| &mut tile.depth);
+        grid.split(&mut self.distance, &mut tiles, |tile| &mut tile.distance);
+        grid.split(&mut self.normal, &mut tiles, |tile| &mut tile.normal);
+        grid.split(&mut self.object, &mut tiles, |tile| &mut tile.object);
+        grid.split(&mut self.prim, &mut tiles, |tile| &mut tile.prim);
+        grid.split(&mut self.bary, &mut tiles, |tile| &mut tile.bary);
+        tiles
+    }
+}
+
+fn layer<T: Copy>(wanted: bool, value: T, pixels: usize) -> Vec<T> {
+    if wanted { vec![value; pixels] } else { Vec::new() }
+}
+
+/// How a film is cut into tiles.
+struct TileGrid {
+    film_width: usize,
+    width: usize,
+    height: u32,
+}
+
+impl TileGrid {
+    /// Hands out the row segments of one layer; an empty layer hands out nothing.
+    fn split<'a, T>(
+        &self,
+        layer: &'a mut [T],
+        tiles: &mut [TileMut<'a>],
+        rows: impl for<'t> Fn(&'t mut TileMut<'a>) -> &'t mut Vec<&'a mut [T]>,
+    ) {
+        let columns = self.film_width.div_ceil(self.width);
+        for (y, row) in layer.chunks_exact_mut(self.film_width).enumerate() {
+            let first = y / self.height as usize * columns;
+            for (tile, segment) in tiles[first..].iter_mut().zip(row.chunks_mut(self.width)) {
+                let tile_height = tile.height as usize;
+                let rows = rows(tile);
+                if rows.is_empty() {
+                    rows.reserve_exact(tile_height);
+                }
+                rows.push(segment);
+            }
+        }
+    }
+}
+
+/// One tile of a film: the segments of its rows in every layer.
+#[derive(Debug)]
+pub struct TileMut<'a> {
+    /// Column of its left edge in the film.
+    pub x: u32,
+    /// Row of its top edge in the film.
+    pub y: u32,
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    color: Vec<&'a mut [Vec3]>,
+    alpha: Vec<&'a mut [f32]>,
+    depth: Vec<&'a mut [f32]>,
+    distance: Vec<&'a mut [f32]>,
+    normal: Vec<&'a mut [Vec3]>,
+    object: Vec<&'a mut [u32]>,
+    prim: Vec<&'a mut [u32]>,
+    bary: Vec<&'a mut [Vec2]>,
+}
+
+impl TileMut<'_> {
+    fn new(x: u32, y: u32, width: u32, height: u32) -> Self {
+        Self {
+            x,
+            y,
+            width,
+            height,
+            color: Vec::new(),
+            alpha: Vec::new(),
+            depth: Vec::new(),
+            distance: Vec::new(),
+            normal: Vec::new(),
+            object: Vec::new(),
+            prim: Vec::new(),
+            bary: Vec::new(),
+        }
+    }
+
+    /// Writes what a pixel saw into the layers the film holds. The pixel's place is relative to the tile.
+    ///
+    /// # Panics
+    /// If the pixel lies outside of the tile.
+    #[inline]
+    pub fn put(&mut self, x: u32, y: u32, sample: &Sample) {
+        let (x, y) = (x as usize, y as usize);
+        self.color[y][x] = sample.color;
+        set(&mut self.alpha, x, y, sample.alpha);
+        set(&mut self.depth, x, y, sample.depth);
+        set(&mut self.distance, x, y, sample.distance);
+        set(&mut self.normal, x, y, sample.normal);
+        set(&mut self.object, x, y, sample.object);
+        set(&mut self.prim, x, y, sample.prim);
+        set(&mut self.bary, x, y, sample.bary);
+    }
+
+    /// One row of colours, for tiles that are written row by row.
+    pub fn color_row(&mut self, y: u32) -> &mut [Vec3] {
+        self.color[y as usize]
+    }
+}
+
+#[inline]
+fn set<T>(rows: &mut [&mut [T]], x: usize, y: usize, value: T) {
+    if let Some(row) = rows.get_mut(y) {
+        row[x] = value;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rayon::prelude::*;
+
+    use super::*;
+
+    fn sample(x: u32, y: u32) -> Sample {
+        let (fx, fy) = (x as f32, y as f32);
+        Sample {
+            color: Vec3::new(fx, fy, fx * fy),
+            alpha: 1.0,
+            depth: fx + 1.0,
+            distance: fy + 2.0,
+            normal: Vec3::Y,
+            object: x,
+            prim: x + 1000 * y,
+            bary: Vec2::new(fx, fy),
+        }
+    }
+
+    #[test]
+    fn tiles_cover_every_pixel_once() {
+        let (width, height) = (37, 23);
+        for (tw, th) in [(8, 8), (37, 1), (1, 23), (64, 64), (5, 7)] {
+            let mut film = Film::new(width, height, Layers::ALL).unwrap();
+            film.tiles_mut(tw, th).into_par_iter().for_each(|mut tile| {
+                for y in 0..tile.height {
+                    for x in 0..tile.width {
+                        tile.put(x, y, &sample(tile.x + x, tile.y + y));
+                    }
+                }
+            });
+            for y in 0..height {
+                for x in 0..width {
+                    let (i, want) = ((y * width + x) as usize, sample(x, y));
+                    assert_eq!(
+                        (film.color[i], film.alpha[i]),
+                        (want.color, want.alpha),
+                        "tiles {tw}x{th}"
+                    );
+                    assert_eq!((film.depth[i], film.distance[i]), (want.depth, want.distance));
+                    assert_eq!((film.normal[i], film.bary[i]), (want.normal, want.bary));
+                    assert_eq!((film.object[i], film.prim[i]), (want.object, want.prim));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn layers_that_were_not_asked_for_are_empty() {
+        let layers = Layers {
+            prim: true,
+            ..Layers::default()
+        };
+        let mut film = Film::new(4, 2, layers).unwrap();
+        film.tiles_mut(4, 1)[1].put(3, 0, &sample(3, 1));
+        assert_eq!(film.prim, [NO_ID, NO_ID, NO_ID, NO_ID, NO_ID, NO_ID, NO_ID, 1003]);
+        assert!(film.depth.is_empty() && film.normal.is_empty() && film.alpha.is_empty());
+    }
+
+    #[test]
+    fn sizes_without_meaning_are_errors() {
+        assert!(Film::new(0, 5, Layers::default()).is_err());
+        assert!(Film::new(1 << 20, 1 << 20, Layers::default()).is_err());
+    }
+}
