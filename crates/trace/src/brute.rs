@@ -3,6 +3,8 @@
 //! Every triangle is tested with [`crate::exact`]. Cost: some 30 ns a triangle and ray. Tie-break: of hits at
 //! equal f64 `t`, the smallest id wins.
 
+use std::cmp::Ordering;
+
 use crate::exact::{self, ExactHit};
 use crate::{Accel, Hit, Light, Ray, Receiver, Triangles};
 
@@ -18,7 +20,7 @@ impl<'a> BruteForce<'a> {
         Self { triangles }
     }
 
-    /// All hits in the ray's range, unsorted, with their triangle ids.
+    /// All hits in the ray's range by ascending id, with their triangle ids.
     pub fn hits(&self, ray: &Ray) -> impl Iterator<Item = (u32, ExactHit)> + '_ {
         let ray = *ray;
         let count = if ray.is_valid() { self.triangles.len() as u32 } else { 0 };
@@ -47,6 +49,14 @@ pub(crate) fn rounded(prim: u32, hit: &ExactHit) -> Hit {
     Hit { t: hit.t as f32, u: hit.u as f32, v: hit.v as f32, prim }
 }
 
+/// Sorts exact hits as [`Accel::all_hits`] promises and writes them out rounded.
+pub(crate) fn write_sorted(mut found: Vec<(u32, ExactHit)>, hits: &mut Vec<Hit>) {
+    // Not `total_cmp`: -0 and 0 tie. No `t` is NaN, since it lies in a range.
+    found.sort_unstable_by(|(p, a), (q, b)| a.t.partial_cmp(&b.t).unwrap_or(Ordering::Equal).then(p.cmp(q)));
+    hits.clear();
+    hits.extend(found.iter().map(|(prim, hit)| rounded(*prim, hit)));
+}
+
 impl Accel for BruteForce<'_> {
     fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.closest(ray).map(|(prim, hit)| rounded(prim, &hit))
@@ -56,7 +66,14 @@ impl Accel for BruteForce<'_> {
         self.hits(ray).next().is_some()
     }
 
+    fn all_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+        write_sorted(self.hits(ray).collect(), hits);
+    }
+
     fn shadowed(&self, receiver: &Receiver, light: &Light) -> bool {
-        (0..self.triangles.len() as u32).any(|prim| exact::shadows(&self.triangles, prim, receiver, light))
+        (0..self.triangles.len() as u32).any(|prim| {
+            self.triangles.corners(prim).iter().all(|p| p.is_finite())
+                && exact::shadows(&self.triangles, prim, receiver, light)
+        })
     }
 }

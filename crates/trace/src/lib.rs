@@ -15,11 +15,13 @@
 
 mod accel;
 pub mod brute;
+mod bvh;
 pub mod exact;
 mod ray;
 mod triangles;
 
-pub use accel::Accel;
+pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;
+pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use triangles::Triangles;

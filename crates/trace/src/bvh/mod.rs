@@ -1,0 +1,251 @@
+//! [`Bvh`]: a bounding volume hierarchy for arbitrary rays (reflection, refraction, single queries).
+//!
+//! Source: PLOC clustering with reinsertion (Meister and Bittner 2018, 2020), as `obvhs` implements it; widened to
+//! four children a node.
+//!
+//! Layout: 128 bytes a node with its four child boxes side by side, 40 bytes a triangle in leaf order (its corners,
+//! so that a leaf test touches one run of memory), at most four triangles a leaf. Units are the triangles'.
+//!
+//! Answers equal [`crate::BruteForce`]'s bit for bit: box tests are conservative ([`slab`]), a f64 filter drops
+//! triangles that are certainly missed, and [`crate::exact`] decides on the rest.
+//!
+//! Limits: build once, trace often; there is no refit. Coordinates beyond 2^125 are traced correctly, but every
+//! triangle is tested.
+
+mod build;
+mod node;
+mod slab;
+
+use std::ops::ControlFlow;
+
+use glam::{DVec3, Vec3};
+
+use crate::brute::{hit_in_range, rounded, write_sorted};
+use crate::exact::{self, ExactHit};
+use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles};
+use build::{Built, Leaf};
+use node::{INNER, WIDTH};
+use slab::Slab;
+
+/// A hierarchy over the triangles of one frame. See the module's documentation.
+#[derive(Clone, Debug)]
+pub struct Bvh<'a> {
+    triangles: Triangles<'a>,
+    nodes: Vec<node::Node>,
+    leaves: Vec<Leaf>,
+    stack: usize,
+    reach: f64,
+    stats: BuildStats,
+}
+
+/// Stack entries kept without allocation; deeper trees allocate their stack for each ray.
+const INLINE_STACK: usize = 64;
+
+impl<'a> Bvh<'a> {
+    /// Builds over all triangles that are finite and have area, in parallel; the same for any number of threads.
+    pub fn build(triangles: Triangles<'a>) -> Self {
+        let Built { nodes, leaves, stack, reach, stats } = build::build(&triangles);
+        Self { triangles, nodes, leaves, stack, reach, stats }
+    }
+
+    /// What was built and what was left out.
+    pub fn stats(&self) -> BuildStats {
+        self.stats
+    }
+
+    /// Memory of the hierarchy in bytes, the triangles themselves left out.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.nodes) + size_of_val(&*self.leaves)
+    }
+
+    /// [`Accel::intersect`] in f64, counting the work.
+    pub fn closest(&self, ray: &Ray, count: &mut impl Count) -> Option<(u32, ExactHit)> {
+        let mut slab = self.slab(ray)?;
+        let filter = Filter::new(ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        let mut best: Option<(u32, ExactHit)> = None;
+        self.walk(&mut slab, count, |leaf, slab| {
+            if filter.certain_miss(&leaf.corners) {
+                return ControlFlow::Continue(());
+            }
+            if let Some(hit) = hit_in_range(&self.triangles, leaf.prim, ray) {
+                let closer = best.is_none_or(|(prim, b)| hit.t < b.t || (hit.t == b.t && leaf.prim < prim));
+                if closer {
+                    best = Some((leaf.prim, hit));
+                    slab.shorten(hit.t);
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        best
+    }
+
+    /// [`Accel::occluded`], counting the work.
+    pub fn any(&self, ray: &Ray, count: &mut impl Count) -> bool {
+        let Some(mut slab) = self.slab(ray) else { return false };
+        let filter = Filter::new(ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        let mut found = false;
+        self.walk(&mut slab, count, |leaf, _| {
+            found = !filter.certain_miss(&leaf.corners) && hit_in_range(&self.triangles, leaf.prim, ray).is_some();
+            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        found
+    }
+
+    /// [`Accel::shadowed`], counting the work.
+    pub fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool {
+        // The same origins and directions as `exact::shadows`. A negative error bound would let crossings behind
+        // either end count.
+        let beyond = if receiver.error >= 0.0 { 0.0 } else { f64::INFINITY };
+        let (origin, dir, t_min, t_max) = match *light {
+            Light::Point(position) => {
+                let origin = position.as_dvec3();
+                (origin, receiver.point - origin, 0.0, 1.0 + beyond)
+            }
+            Light::Directional(direction) => (receiver.point, direction.as_dvec3(), -beyond, f64::INFINITY),
+        };
+        let Some(mut slab) = Slab::new(origin, dir, t_min, t_max, self.reach) else { return false };
+        let filter = Filter::new(origin, dir);
+        let mut found = false;
+        self.walk(&mut slab, count, |leaf, _| {
+            found = !filter.certain_miss(&leaf.corners)
+                && exact::shadows(&self.triangles, leaf.prim, receiver, light);
+            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        });
+        found
+    }
+
+    fn slab(&self, ray: &Ray) -> Option<Slab> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
+        Slab::new(ray.origin.as_dvec3(), ray.dir.as_dvec3(), t_min, t_max, self.reach)
+    }
+
+    /// Calls `visit` with every triangle whose leaf the ray may enter, nearer leaves first as far as boxes tell.
+    #[inline(always)]
+    fn walk<C: Count>(
+        &self,
+        slab: &mut Slab,
+        count: &mut C,
+        visit: impl FnMut(&Leaf, &mut Slab) -> ControlFlow<()>,
+    ) {
+        if self.stack <= INLINE_STACK {
+            self.walk_with(&mut [Entry::default(); INLINE_STACK], slab, count, visit);
+        } else {
+            self.walk_with(&mut vec![Entry::default(); self.stack], slab, count, visit);
+        }
+    }
+
+    #[inline(always)]
+    fn walk_with<C: Count>(
+        &self,
+        stack: &mut [Entry],
+        slab: &mut Slab,
+        count: &mut C,
+        mut visit: impl FnMut(&Leaf, &mut Slab) -> ControlFlow<()>,
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        stack[0] = Entry { near: f32::NEG_INFINITY, first: 0, count: INNER };
+        let mut held = 1;
+        while held > 0 {
+            held -= 1;
+            let entry = stack[held];
+            if entry.near > slab.t_max {
+                continue;
+            }
+            if entry.count != INNER {
+                let leaves = &self.leaves[entry.first as usize..][..entry.count as usize];
+                count.triangles(leaves.len());
+                for leaf in leaves {
+                    if visit(leaf, slab).is_break() {
+                        return;
+                    }
+                }
+                continue;
+            }
+            count.node();
+            let node = &self.nodes[entry.first as usize];
+            let (near, hit) = slab.enter(node);
+            let bottom = held;
+            for lane in 0..WIDTH {
+                if hit[lane] {
+                    // Insertion sort: the nearest child ends up on top.
+                    let child = Entry { near: near[lane], first: node.first[lane], count: node.count[lane] };
+                    let mut at = held;
+                    while at > bottom && stack[at - 1].near < child.near {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
+                    }
+                    stack[at] = child;
+                    held += 1;
+                }
+            }
+        }
+    }
+}
+
+/// A node or a run of leaves waiting on the stack.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    near: f32,
+    first: u32,
+    count: u32,
+}
+
+impl Accel for Bvh<'_> {
+    fn intersect(&self, ray: &Ray) -> Option<Hit> {
+        self.closest(ray, &mut ()).map(|(prim, hit)| rounded(prim, &hit))
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.any(ray, &mut ())
+    }
+
+    fn all_hits(&self, ray: &Ray, hits: &mut Vec<Hit>) {
+        let mut found = Vec::new();
+        if let Some(mut slab) = self.slab(ray) {
+            self.walk(&mut slab, &mut (), |leaf, _| {
+                found.extend(hit_in_range(&self.triangles, leaf.prim, ray).map(|hit| (leaf.prim, hit)));
+                ControlFlow::Continue(())
+            });
+        }
+        write_sorted(found, hits);
+    }
+
+    fn shadowed(&self, receiver: &Receiver, light: &Light) -> bool {
+        self.shadows(receiver, light, &mut ())
+    }
+}
+
+/// Drops triangles that a line certainly misses, in plain f64.
+///
+/// The edge functions of [`exact`] are evaluated without their error terms. Each sums six products of three
+/// factors, so it is within some 10 * 2^-53 of 6 |d| |a|^2 with the largest components of direction and
+/// corners; two values of opposite sign beyond 2^-44 |d| |a|^2 are certain.
+struct Filter {
+    origin: DVec3,
+    dir: DVec3,
+    bound: f64,
+}
+
+impl Filter {
+    fn new(origin: DVec3, dir: DVec3) -> Self {
+        Self { origin, dir, bound: dir.abs().max_element() * f64::from_bits((1023 - 44) << 52) }
+    }
+
+    #[inline(always)]
+    fn certain_miss(&self, corners: &[Vec3; 3]) -> bool {
+        let [a0, a1, a2] = corners.map(|c| c.as_dvec3() - self.origin);
+        // d . (a x b) = b . (d x a): the first two products are shared by the three edges.
+        let (c0, c1) = (self.dir.cross(a0), self.dir.cross(a1));
+        let (e0, e1, e2) = (c1.dot(a2), -c0.dot(a2), c0.dot(a1));
+        let size = a0.abs().max(a1.abs()).max(a2.abs()).max_element();
+        let bound = self.bound * size * size;
+        let low = e0.min(e1).min(e2);
+        let high = e0.max(e1).max(e2);
+        low < -bound && high > bound
+    }
+}
