@@ -50,8 +50,7 @@ fn volume(a: DVec3, b: DVec3, d: DVec3) -> f64 {
 /// `None` for triangles without area and for rays within the triangle's plane.
 #[inline]
 pub fn hit(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<ExactHit> {
-    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
-    let (a0, a1, a2) = (v0 - origin, v1 - origin, v2 - origin);
+    let [a0, a1, a2] = corners.map(|v| v.as_dvec3() - origin);
     let e0 = volume(a1, a2, dir);
     let e1 = volume(a2, a0, dir);
     if e0 * e1 < 0.0 {
@@ -63,17 +62,31 @@ pub fn hit(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<ExactHit> {
     if negative == positive {
         return None;
     }
-    let normal = (v1 - v0).cross(v2 - v0);
+    attributes(origin, dir, corners)
+}
+
+/// Where the line o + t d meets the triangle, given that it does: the same values as [`hit`], without the
+/// decision.
+///
+/// `None` for triangles without area.
+#[inline]
+pub fn attributes(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<ExactHit> {
+    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    let (a0, edge1, edge2) = (v0 - origin, v1 - v0, v2 - v0);
+    let normal = edge1.cross(edge2);
     if normal == DVec3::ZERO {
         return None;
     }
-    let mut t = a0.dot(normal) / dir.dot(normal);
+    let steepness = dir.dot(normal);
+    let t = a0.dot(normal) / steepness;
     if !t.is_finite() {
         // The plane is so steep that d . N rounds to zero: the corner's own distance is as good as any.
-        t = a0.dot(dir) / dir.length_squared();
+        return Some(ExactHit { t: a0.dot(dir) / dir.length_squared(), u: 0.0, v: 0.0 });
     }
-    let sum = e0 + e1 + e2;
-    Some(ExactHit { t, u: e1 / sum, v: e2 / sum })
+    let moment = a0.cross(dir);
+    let u = edge2.dot(moment) / steepness;
+    let v = -edge1.dot(moment) / steepness;
+    Some(ExactHit { t, u, v })
 }
 
 /// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its

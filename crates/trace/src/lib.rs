@@ -14,14 +14,23 @@
 //! Positions are f32 in one local frame (the caller keeps its f64 origin). Units are the caller's.
 
 mod accel;
+mod bins;
 pub mod brute;
 mod bvh;
 pub mod exact;
+mod eye_grid;
+mod kernel;
+mod precise;
 mod ray;
 mod triangles;
+pub mod view;
 
+pub use bins::Binning;
+pub use eye_grid::{EyeGrid, EyeGridOptions, Tile, TileHits};
+pub use kernel::SimdLevel;
 pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;
 pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use triangles::Triangles;
+pub use view::{View, ViewRay};

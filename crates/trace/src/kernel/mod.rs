@@ -1,0 +1,77 @@
+//! The only vector code of the crate.
+//!
+//! Rules: one generic kernel a file, over sixteen f32 lanes at every level; `dispatch!` once per call on a tile
+//! or batch, never per ray; no `unsafe`. A kernel never decides a hit on the strength of rounded arithmetic:
+//! it classifies lanes as certainly in, certainly out or unsure with an error bound, and unsure lanes go to
+//! [`crate::exact`]. That is why fused multiply-adds are allowed here and the answers are still the same at every
+//! level.
+
+pub(crate) mod edges;
+pub(crate) mod points;
+pub(crate) mod project;
+pub(crate) mod tile;
+
+use fearless_simd::{Level, Simd};
+
+/// Lanes of every kernel.
+pub(crate) const LANES: usize = 16;
+
+/// Unit roundoff of f32: half the distance from 1 to the next number.
+pub(crate) const ROUNDOFF: f32 = f32::EPSILON * 0.5;
+
+/// Relative width of the band in which two nearnesses count as unsure. Planes are only used by the kernels
+/// where they are known to a quarter of it.
+pub(crate) const NEARNESS_BAND: f32 = 1.0 / 32768.0;
+
+/// An instruction set the kernels are compiled for. Detected once and passed down.
+#[derive(Clone, Copy, Debug)]
+pub struct SimdLevel(pub(crate) Level);
+
+impl SimdLevel {
+    /// The best level of this machine.
+    pub fn detect() -> Self {
+        Self(Level::new())
+    }
+
+    /// Every level that runs on this machine, best first. The scalar fallback is among them only where it is
+    /// the baseline, or in tests.
+    pub fn available() -> Vec<Self> {
+        let best = Level::new();
+        let mut levels = Vec::new();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        {
+            levels.extend(best.as_avx512().map(|s| s.level()));
+            levels.extend(best.as_avx2().map(|s| s.level()));
+            levels.extend(best.as_sse4_2().map(|s| s.level()));
+            levels.extend(best.as_sse2().map(|s| s.level()));
+        }
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        levels.push(best);
+        #[cfg(test)]
+        levels.push(Level::fallback());
+        levels.into_iter().map(Self).collect()
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &'static str {
+        match self.0 {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Level::Avx512(_) => "AVX-512",
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Level::Avx2(_) => "AVX2",
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Level::Sse4_2(_) => "SSE4.2",
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Level::Sse2(_) => "SSE2",
+            #[cfg(target_arch = "aarch64")]
+            Level::Neon(_) => "NEON",
+            _ => "scalar",
+        }
+    }
+}
+
+impl Default for SimdLevel {
+    fn default() -> Self {
+        Self::detect()
+    }
+}

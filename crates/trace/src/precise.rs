@@ -1,0 +1,159 @@
+//! One triangle in a view, in f64: for the few that f32 lanes cannot set up.
+//!
+//! In homogeneous raster coordinates p_i = (x, y, w) the edge functions are n_i = p_j x p_k dotted with
+//! (x, y, 1): no clipping is needed for triangles that reach behind the center of projection. Their sign is
+//! oriented so that every ray that hits (t > 0) sees all three non-negative; that orientation is exact.
+//! Nearness is sum(m_i E_i) / det. Cost: some 150 operations; used for triangles that cross the center's plane,
+//! lie far outside of the raster or are nearly edge-on, and to bin large ones.
+
+use glam::{DVec3, Vec3};
+use robust::{Coord3D, orient3d};
+
+use crate::kernel::edges::EdgeRecord;
+use crate::kernel::{NEARNESS_BAND, ROUNDOFF};
+use crate::view::{Arrangement, View};
+
+/// Bound on the relative f64 error of a product of homogeneous coordinates; generous.
+const PRODUCT_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
+
+/// Edge functions, nearness plane and their error bounds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PreciseTriangle {
+    points: [DVec3; 3],
+    /// Coefficients (of x, of y, constant); inside is where all are non-negative.
+    edges: [DVec3; 3],
+    /// Bound on the error of each edge function anywhere on the raster.
+    edge_errors: [f64; 3],
+    nearness: DVec3,
+    nearness_error: f64,
+    /// Nearness above which a point is not certain to lie in front of the view's start.
+    ceiling: f64,
+}
+
+impl PreciseTriangle {
+    /// `None` if no ray of the view can hit: the triangle has no area, is not finite, or is seen edge-on.
+    pub(crate) fn new(view: &View, corners: [Vec3; 3]) -> Option<Self> {
+        if !corners.iter().all(|c| c.is_finite()) {
+            return None;
+        }
+        let orientation = orientation(view, corners);
+        if orientation == 0.0 {
+            return None;
+        }
+        let homogeneous = corners.map(|c| view.homogeneous(c.as_dvec3()));
+        let points = homogeneous.map(|h| h.p);
+        let [p0, p1, p2] = points;
+        let edges = [p1.cross(p2) * orientation, p2.cross(p0) * orientation, p0.cross(p1) * orientation];
+        let size = points.map(|p| p.abs().element_sum());
+        let extent = f64::from(view.width + view.height + 1);
+        let error = |a: f64, b: f64| PRODUCT_ERROR * a * b * extent;
+        let edge_errors = [error(size[1], size[2]), error(size[2], size[0]), error(size[0], size[1])];
+        let det = p0.dot(edges[0]).max(f64::MIN_POSITIVE);
+        let det_error = PRODUCT_ERROR * size[0] * size[1] * size[2] / det;
+        let m = homogeneous.map(|h| h.m);
+        let nearness = (edges[0] * m[0] + edges[1] * m[1] + edges[2] * m[2]) / det;
+        let sum_error: f64 = (0..3).map(|i| m[i].abs() * edge_errors[i]).sum::<f64>() / det;
+        let largest = nearness.abs().dot(DVec3::new(extent, extent, 1.0));
+        let ceiling = match view.arrangement {
+            Arrangement::Perspective => f64::INFINITY,
+            Arrangement::Parallel { reach } => reach * (1.0 - f64::from(NEARNESS_BAND)),
+        };
+        let nearness_error = sum_error + largest * det_error;
+        Some(Self { points, edges, edge_errors, nearness, nearness_error, ceiling })
+    }
+
+    /// Whether some ray of the raster rectangle may hit; never wrong when it says no.
+    pub(crate) fn overlaps(&self, min: [f64; 2], max: [f64; 2]) -> bool {
+        self.edges.iter().zip(self.edge_errors).all(|(e, error)| {
+            let x = if e.x > 0.0 { max[0] } else { min[0] };
+            let y = if e.y > 0.0 { max[1] } else { min[1] };
+            e.x * x + e.y * y + e.z >= -error
+        })
+    }
+
+    /// Raster rectangle (min, max) that holds all of the triangle that the view sees; `None` if nothing.
+    ///
+    /// The part inside the view's pyramid is cut out in homogeneous coordinates, so that no division by a depth
+    /// near zero occurs unless the triangle passes through the center itself.
+    pub(crate) fn bounds(&self, view: &View) -> Option<[[f64; 2]; 2]> {
+        let (width, height) = (f64::from(view.width), f64::from(view.height));
+        let planes = [
+            DVec3::X,
+            DVec3::Y,
+            DVec3::new(-1.0, 0.0, width),
+            DVec3::new(0.0, -1.0, height),
+        ];
+        let mut polygon: Vec<DVec3> = self.points.to_vec();
+        for plane in planes {
+            polygon = clip(&polygon, plane);
+            if polygon.is_empty() {
+                return None;
+            }
+        }
+        let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for p in polygon {
+            // Inside the pyramid only its tip has no depth; there the triangle may cover everything.
+            let [x, y] = [p.x / p.z, p.y / p.z];
+            if !(x.is_finite() && y.is_finite()) {
+                return Some([[0.0, 0.0], [width, height]]);
+            }
+            min = [min[0].min(x), min[1].min(y)];
+            max = [max[0].max(x), max[1].max(y)];
+        }
+        let slack = (width + height) * 1e-7;
+        Some([min.map(|v| v - slack), max.map(|v| v + slack)])
+    }
+
+    /// The triangle as the kernels take it, relative to raster point `origin` and for use within `reach` of it.
+    pub(crate) fn record(&self, prim: u32, origin: [f64; 2], reach: f64) -> EdgeRecord {
+        let at_origin = |p: DVec3| DVec3::new(p.x, p.y, p.x * origin[0] + p.y * origin[1] + p.z);
+        let rounding = |p: DVec3| 8.0 * f64::from(ROUNDOFF) * (p.x.abs() * reach + p.y.abs() * reach + p.z.abs());
+        let mut record = EdgeRecord { prim, ..EdgeRecord::default() };
+        for i in 0..3 {
+            let edge = at_origin(self.edges[i]);
+            let scale = 1.0 / (1.01 * (self.edge_errors[i] + rounding(edge)));
+            let edge = edge * scale;
+            (record.a[i], record.b[i], record.c[i]) = (edge.x as f32, edge.y as f32, edge.z as f32);
+        }
+        let plane = at_origin(self.nearness);
+        (record.nearness_x, record.nearness_y, record.nearness) =
+            (plane.x as f32, plane.y as f32, plane.z as f32);
+        record.floor = ((self.nearness_error + rounding(plane)) * 4.0 / f64::from(NEARNESS_BAND)) as f32;
+        record.ceiling = self.ceiling as f32;
+        record
+    }
+}
+
+/// Exact sign of the edge functions inside the triangle: which way round it lies in the raster.
+fn orientation(view: &View, corners: [Vec3; 3]) -> f64 {
+    let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
+    let zero = coord(DVec3::ZERO);
+    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    let volume = match view.arrangement {
+        Arrangement::Perspective => {
+            let c = view.center.as_dvec3();
+            orient3d(coord(v0 - c), coord(v1 - c), coord(v2 - c), zero)
+        }
+        Arrangement::Parallel { .. } => {
+            orient3d(coord(v1 - v0), coord(v2 - v0), coord(view.forward), zero)
+        }
+    };
+    let handedness = -view.right.cross(view.up).dot(view.forward);
+    if volume == 0.0 { 0.0 } else { volume.signum() * handedness.signum() }
+}
+
+/// The part of a convex polygon where `plane . p >= 0` (Sutherland and Hodgman).
+fn clip(polygon: &[DVec3], plane: DVec3) -> Vec<DVec3> {
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, &p) in polygon.iter().enumerate() {
+        let q = polygon[(i + 1) % polygon.len()];
+        let (dp, dq) = (plane.dot(p), plane.dot(q));
+        if dp >= 0.0 {
+            kept.push(p);
+        }
+        if (dp >= 0.0) != (dq >= 0.0) {
+            kept.push(p + (q - p) * (dp / (dp - dq)));
+        }
+    }
+    kept
+}

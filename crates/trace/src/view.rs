@@ -1,0 +1,140 @@
+//! A vantage's view: the map between space and a raster, and the rays through raster points.
+//!
+//! A raster point (x, y) in \[0, width\] x \[0, height\], row 0 on top, names one ray of the vantage. For a
+//! perspective view all rays leave `center`; for a parallel one they share the direction `forward`. Either way
+//! lines through the vantage become points of the raster, so triangles become 2-D triangles and visibility a
+//! question of coverage and order (HM08 §3: perspective space; its X and Y are the raster's up to scale).
+//!
+//! Order along a ray is kept as *nearness*, larger being nearer and affine in the raster for every plane:
+//! 1 / depth in a perspective view, `reach - depth` in a parallel one. Depth is measured along `forward`, which
+//! has length 1, so it equals the parameter t of the ray.
+//!
+//! The center is an f32 point, and the geometry is f32, so differences are exact to the last bit; the axes are
+//! f64.
+
+use glam::{DVec3, Vec3};
+
+/// How the rays of a view are arranged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Arrangement {
+    /// All rays leave one point.
+    Perspective,
+    /// All rays have one direction; nearness is `reach - depth`.
+    Parallel {
+        /// Larger than twice every depth that occurs, so that nearness has a stable relative precision.
+        reach: f64,
+    },
+}
+
+/// The view of a camera, or of one face of a light, onto its raster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Center of projection, or the middle of the raster's plane in a parallel view; exactly representable.
+    pub center: Vec3,
+    /// Unit axis of growing x.
+    pub right: DVec3,
+    /// Unit axis of falling y (row 0 is on top).
+    pub up: DVec3,
+    /// Unit view direction.
+    pub forward: DVec3,
+    /// Raster units per unit of tangent (perspective) or length (parallel).
+    pub scale_x: f64,
+    /// As `scale_x`, for y.
+    pub scale_y: f64,
+    /// Raster width.
+    pub width: u32,
+    /// Raster height.
+    pub height: u32,
+    /// Arrangement of the rays.
+    pub arrangement: Arrangement,
+}
+
+/// A ray in f64: `origin + t * dir`, t > 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ViewRay {
+    /// Start.
+    pub origin: DVec3,
+    /// Direction; its component along the view's `forward` is 1.
+    pub dir: DVec3,
+}
+
+/// Homogeneous raster coordinates of a point: raster = (x, y) / w, nearness = m / w.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Homogeneous {
+    /// (x, y, w).
+    pub p: DVec3,
+    /// Nearness times w.
+    pub m: f64,
+}
+
+impl View {
+    /// A perspective view whose half angles have the tangents `tan_x` and `tan_y`.
+    pub fn perspective(center: Vec3, axes: [DVec3; 3], tan: [f64; 2], size: [u32; 2]) -> Self {
+        let [right, up, forward] = axes;
+        let [width, height] = size;
+        Self {
+            center,
+            right,
+            up,
+            forward,
+            scale_x: f64::from(width) / (2.0 * tan[0]),
+            scale_y: f64::from(height) / (2.0 * tan[1]),
+            width,
+            height,
+            arrangement: Arrangement::Perspective,
+        }
+    }
+
+    /// A parallel view of half extents `half`, for depths up to half of `reach` in magnitude.
+    pub fn parallel(center: Vec3, axes: [DVec3; 3], half: [f64; 2], reach: f64, size: [u32; 2]) -> Self {
+        let arrangement = Arrangement::Parallel { reach };
+        Self { arrangement, ..Self::perspective(center, axes, half, size) }
+    }
+
+    /// The middle of the raster.
+    pub fn middle(&self) -> [f64; 2] {
+        [f64::from(self.width) * 0.5, f64::from(self.height) * 0.5]
+    }
+
+    /// The ray through raster point (x, y).
+    #[inline]
+    pub fn ray(&self, x: f64, y: f64) -> ViewRay {
+        let [cx, cy] = self.middle();
+        let offset = self.right * ((x - cx) / self.scale_x) + self.up * ((cy - y) / self.scale_y);
+        let center = self.center.as_dvec3();
+        match self.arrangement {
+            Arrangement::Perspective => ViewRay { origin: center, dir: self.forward + offset },
+            Arrangement::Parallel { .. } => ViewRay { origin: center + offset, dir: self.forward },
+        }
+    }
+
+    /// The ray through the centre of pixel (x, y).
+    #[inline]
+    pub fn pixel_ray(&self, x: u32, y: u32) -> ViewRay {
+        self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)
+    }
+
+    /// Homogeneous raster coordinates of a point; `w` is its depth in a perspective view and 1 otherwise.
+    #[inline]
+    pub fn homogeneous(&self, point: DVec3) -> Homogeneous {
+        let a = point - self.center.as_dvec3();
+        let depth = a.dot(self.forward);
+        let (w, m) = match self.arrangement {
+            Arrangement::Perspective => (depth, 1.0),
+            Arrangement::Parallel { reach } => (1.0, reach - depth),
+        };
+        let [cx, cy] = self.middle();
+        let x = a.dot(self.right) * self.scale_x + cx * w;
+        let y = cy * w - a.dot(self.up) * self.scale_y;
+        Homogeneous { p: DVec3::new(x, y, w), m }
+    }
+
+    /// Nearness of a depth.
+    #[inline]
+    pub fn nearness(&self, depth: f64) -> f64 {
+        match self.arrangement {
+            Arrangement::Perspective => 1.0 / depth,
+            Arrangement::Parallel { reach } => reach - depth,
+        }
+    }
+}
