@@ -6,7 +6,9 @@
 
 mod gltf;
 mod obj;
+mod plain;
 mod ply;
+mod polygon;
 mod stl;
 
 use std::fs::File;
