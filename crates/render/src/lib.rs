@@ -7,9 +7,12 @@
 mod camera;
 mod error;
 mod film;
+pub mod shade;
+pub mod texture;
 pub mod tonemap;
 
 pub use camera::CameraFrame;
 pub use error::{Error, Result};
 pub use film::{Film, Layers, NO_ID, Sample, TileMut};
+pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};

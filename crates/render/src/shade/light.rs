@@ -1,0 +1,212 @@
+//! Lights prepared for one frame: positions in the local frame, distributions as a scale and an offset.
+//!
+//! Units are those of `KHR_lights_punctual`: candela for point and spot lights, lux for directional ones. Area
+//! lights have a radiance in nits and shine here from their centre, with the cosine at the light.
+
+use glam::{DVec3, Vec3};
+use rayward_scene::{LightKind, PosedLight};
+
+/// What arrives at a point from one light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Incident {
+    /// Unit direction from the point to the light.
+    pub towards: Vec3,
+    /// Distance to the light in metres; infinite for directional lights.
+    pub distance: f32,
+    /// From [`ShadingLight::incident`]: irradiance of a surface that faces the light. From [`super::direct`]:
+    /// radiance that the surface sends to the viewer.
+    pub radiance: Vec3,
+}
+
+/// One light of a frame, ready for shading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShadingLight {
+    /// Position in the local frame, metres.
+    position: Vec3,
+    /// Unit direction in which it shines.
+    direction: Vec3,
+    power: Vec3,
+    /// 1 / range^2, 0 without a range.
+    inverse_range2: f32,
+    distribution: Distribution,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Distribution {
+    Directional,
+    Point,
+    /// Squared linear falloff in the cosine between the two angles.
+    Spot {
+        scale: f32,
+        offset: f32,
+    },
+    /// One side of a plane.
+    Cosine,
+}
+
+impl ShadingLight {
+    /// The light relative to the frame's origin.
+    pub fn new(light: &PosedLight, origin: DVec3) -> Self {
+        let (distribution, area) = match light.kind {
+            LightKind::Directional { .. } => (Distribution::Directional, 1.0),
+            LightKind::Point { .. } => (Distribution::Point, 1.0),
+            LightKind::Spot { inner, outer, .. } => {
+                let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+                (
+                    Distribution::Spot {
+                        scale,
+                        offset: -outer.cos() * scale,
+                    },
+                    1.0,
+                )
+            }
+            LightKind::Rectangle { width, height } => (Distribution::Cosine, width * height),
+            LightKind::Disk { radius } => (Distribution::Cosine, std::f32::consts::PI * radius * radius),
+        };
+        let has_range = light.range > 0.0 && light.range.is_finite();
+        Self {
+            position: (light.position - origin).as_vec3(),
+            direction: light.direction.as_vec3().normalize_or(Vec3::NEG_Z),
+            power: light.power * area,
+            inverse_range2: if has_range {
+                1.0 / (light.range * light.range)
+            } else {
+                0.0
+            },
+            distribution,
+        }
+    }
+
+    /// What arrives at a point in the local frame; `None` outside of the light's reach or cone.
+    #[inline]
+    pub fn incident(&self, point: Vec3) -> Option<Incident> {
+        if self.distribution == Distribution::Directional {
+            return Some(Incident {
+                towards: -self.direction,
+                distance: f32::INFINITY,
+                radiance: self.power,
+            });
+        }
+        let offset = self.position - point;
+        let distance2 = offset.length_squared();
+        let distance = distance2.sqrt();
+        if distance2 == 0.0 {
+            return None;
+        }
+        let towards = offset / distance;
+        let cos = -towards.dot(self.direction);
+        let angular = match self.distribution {
+            Distribution::Spot { scale, offset } => {
+                let falloff = (cos * scale + offset).clamp(0.0, 1.0);
+                falloff * falloff
+            }
+            Distribution::Cosine => cos.max(0.0),
+            Distribution::Point | Distribution::Directional => 1.0,
+        };
+        // The window of KHR_lights_punctual: 1 - (distance / range)^4, 0 beyond the range.
+        let reach = distance2 * self.inverse_range2;
+        let window = (1.0 - reach * reach).max(0.0);
+        let radiance = self.power * (angular * window / distance2);
+        (radiance != Vec3::ZERO).then_some(Incident {
+            towards,
+            distance,
+            radiance,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f32::consts::{FRAC_PI_4, FRAC_PI_6};
+
+    use super::*;
+
+    const FAR: DVec3 = DVec3::new(1e7, -1e7, 1e7);
+
+    /// A light of power 8 at `FAR` + 2 up that shines down.
+    fn light(kind: LightKind, range: f32) -> ShadingLight {
+        let posed = PosedLight {
+            name: String::new(),
+            position: FAR + 2.0 * DVec3::Y,
+            direction: DVec3::NEG_Y,
+            axis_x: DVec3::X,
+            axis_y: DVec3::Z,
+            power: Vec3::splat(8.0),
+            range,
+            kind,
+        };
+        ShadingLight::new(&posed, FAR)
+    }
+
+    fn irradiance(light: &ShadingLight, point: Vec3) -> f32 {
+        light.incident(point).map_or(0.0, |incident| incident.radiance.x)
+    }
+
+    #[test]
+    fn point_lights_fall_off_with_the_square() {
+        let light = light(LightKind::Point { radius: 0.0 }, f32::INFINITY);
+        let incident = light.incident(Vec3::ZERO).unwrap();
+        assert_eq!(
+            (incident.towards, incident.distance, incident.radiance),
+            (Vec3::Y, 2.0, Vec3::splat(2.0))
+        );
+        assert!((irradiance(&light, Vec3::new(0.0, -2.0, 0.0)) - 0.5).abs() < 1e-6);
+        assert_eq!(light.incident(2.0 * Vec3::Y), None);
+    }
+
+    #[test]
+    fn the_range_is_a_window() {
+        let light = light(LightKind::Point { radius: 0.0 }, 4.0);
+        assert!((irradiance(&light, Vec3::ZERO) - 2.0 * (1.0 - 1.0 / 16.0)).abs() < 1e-6);
+        assert_eq!(light.incident(Vec3::new(0.0, -2.0, 0.0)), None);
+        assert_eq!(light.incident(Vec3::new(0.0, -9.0, 0.0)), None);
+    }
+
+    #[test]
+    fn directional_lights_are_the_same_everywhere() {
+        let light = light(LightKind::Directional { half_angle: 0.0 }, f32::INFINITY);
+        for point in [Vec3::ZERO, Vec3::splat(1e6)] {
+            let incident = light.incident(point).unwrap();
+            assert_eq!((incident.towards, incident.radiance), (Vec3::Y, Vec3::splat(8.0)));
+            assert_eq!(incident.distance, f32::INFINITY);
+        }
+    }
+
+    #[test]
+    fn spots_end_at_their_outer_angle() {
+        let kind = LightKind::Spot {
+            inner: FRAC_PI_6,
+            outer: FRAC_PI_4,
+            radius: 0.0,
+        };
+        let light = light(kind, f32::INFINITY);
+        let at = |angle: f32| {
+            irradiance(&light, Vec3::new(2.0 * angle.tan(), 0.0, 0.0)) / angle.cos().powi(2) / 2.0
+        };
+        assert!((at(0.0) - 1.0).abs() < 1e-6 && (at(FRAC_PI_6 - 1e-3) - 1.0).abs() < 1e-6);
+        assert_eq!(at(FRAC_PI_4 + 1e-3), 0.0);
+        let middle = ((FRAC_PI_6.cos() + FRAC_PI_4.cos()) / 2.0).acos();
+        assert!(
+            (at(middle) - 0.25).abs() < 1e-4,
+            "half the way in the cosine, squared"
+        );
+        assert_eq!(irradiance(&light, 4.0 * Vec3::Y), 0.0, "nothing behind it");
+    }
+
+    #[test]
+    fn area_lights_shine_from_their_centre_to_one_side() {
+        let rectangle = light(
+            LightKind::Rectangle {
+                width: 0.5,
+                height: 2.0,
+            },
+            f32::INFINITY,
+        );
+        assert!((irradiance(&rectangle, Vec3::ZERO) - 2.0).abs() < 1e-6);
+        assert_eq!(irradiance(&rectangle, 4.0 * Vec3::Y), 0.0);
+        let slanted = irradiance(&rectangle, Vec3::new(2.0, 0.0, 0.0));
+        assert!((slanted - 1.0 / 2f32.sqrt()).abs() < 1e-6, "8 cos 45 / 8");
+        let disk = light(LightKind::Disk { radius: 1.0 }, f32::INFINITY);
+        assert!((irradiance(&disk, Vec3::ZERO) - 2.0 * std::f32::consts::PI).abs() < 1e-5);
+    }
+}

@@ -1,0 +1,47 @@
+//! Shading of points on surfaces: attributes and textures to a [`Surface`], and the light it sends to the viewer.
+//!
+//! ```text
+//! hit --Shader::surface--> Surface --direct(light)--> radiance if nothing is in between
+//!                                  --ambient-------> the rest: emission, constant surrounding light
+//! ```
+//!
+//! The model is glTF 2.0's (appendix B), see [`brdf`]; lights are those of `KHR_lights_punctual` in their units.
+//! Area lights stand for a point light at their centre here. Transmission is not shaded: glass looks like the
+//! diffuse base it is coated on.
+//!
+//! Cost: no allocation, no dynamic calls; some 100 ns a surface without textures and 30 ns a light.
+
+pub mod brdf;
+mod light;
+mod surface;
+
+use glam::Vec3;
+
+pub use light::{Incident, ShadingLight};
+pub use surface::{Shader, Surface, SurfacePoint, object_of};
+
+/// Radiance that a surface sends to the viewer because of one light, if nothing is between the two. `None` if
+/// the light cannot reach the viewer's side of the surface, or the surface is unlit: no shadow ray is needed.
+#[inline]
+pub fn direct(surface: &Surface, light: &ShadingLight) -> Option<Incident> {
+    if surface.unlit {
+        return None;
+    }
+    let mut incident = light.incident(surface.position)?;
+    let cos_shading = surface.normal.dot(incident.towards);
+    if cos_shading <= 0.0 || surface.geometric_normal.dot(incident.towards) <= 0.0 {
+        return None;
+    }
+    incident.radiance *= brdf::evaluate(surface, incident.towards) * cos_shading;
+    Some(incident)
+}
+
+/// Radiance that does not come from a light: emission, and the reflection of a surrounding that has the radiance
+/// `surrounding` in all directions. Metals and dielectrics alike reflect about their base colour of it.
+#[inline]
+pub fn ambient(surface: &Surface, surrounding: Vec3) -> Vec3 {
+    if surface.unlit {
+        return surface.base_color;
+    }
+    surface.emissive + surrounding * surface.base_color * surface.occlusion
+}

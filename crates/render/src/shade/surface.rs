@@ -1,0 +1,430 @@
+//! From a triangle, barycentrics and a view direction to everything the reflection model asks for.
+//!
+//! Normals: the geometric one is that of the triangle's plane, in f64; the shading normal is interpolated where
+//! an object has normals and bent by the normal map. Both are turned towards the viewer, so that back faces are
+//! shaded like front faces. Where an object has a normal map but no tangents, these follow from the triangle's
+//! texture coordinates as in MikkTSpace, not smoothed over vertices.
+//!
+//! Textures are filtered by the footprint of the pixel on the surface (Akenine-Möller et al., "Texture Level of
+//! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce).
+
+use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
+use rayon::prelude::*;
+use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
+
+use crate::texture::{Encoding, Texture, Textures};
+
+/// A point on a surface of the frame, as seen from somewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Triangle id.
+    pub prim: u32,
+    /// Index of the object it belongs to, see [`object_of`].
+    pub object: u32,
+    /// Barycentric weight of corner 1.
+    pub u: f32,
+    /// Barycentric weight of corner 2.
+    pub v: f32,
+    /// Unit direction towards the viewer.
+    pub view: Vec3,
+    /// Width of the pixel at the point, perpendicular to the view, metres; 0 for unfiltered textures.
+    pub footprint: f32,
+}
+
+/// The object that a triangle belongs to.
+///
+/// # Panics
+/// If there is no such triangle.
+#[inline]
+pub fn object_of(geometry: &FrameGeometry, prim: u32) -> u32 {
+    let object = geometry
+        .objects
+        .partition_point(|object| object.triangles.end <= prim);
+    assert!(object < geometry.objects.len(), "no triangle {prim}");
+    object as u32
+}
+
+/// A point on a surface with all that its reflection depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Position in the local frame of the geometry, metres.
+    pub position: Vec3,
+    /// Unit normal of the triangle, on the viewer's side.
+    pub geometric_normal: Vec3,
+    /// Unit normal for shading, on the viewer's side of the triangle unless a normal map bends it away.
+    pub normal: Vec3,
+    /// Unit direction towards the viewer.
+    pub view: Vec3,
+    /// Linear base colour: vertex colour, factor and texture.
+    pub base_color: Vec3,
+    /// Coverage after the material's alpha mode: 1 is solid, 0 absent.
+    pub alpha: f32,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Reflectance of the dielectric at normal incidence.
+    pub f0: Vec3,
+    /// Weight of the dielectric's reflection.
+    pub specular: f32,
+    /// Emitted radiance.
+    pub emissive: Vec3,
+    /// Share of the surrounding light that reaches the point.
+    pub occlusion: f32,
+    /// Whether it shows its base colour without any lighting.
+    pub unlit: bool,
+    /// Whether the viewer is on the front side of the triangle.
+    pub front: bool,
+}
+
+/// The materials and textures of a scene, prepared once for all of its frames.
+#[derive(Clone, Debug)]
+pub struct Shader<'s> {
+    materials: Vec<ShaderMaterial>,
+    textures: Textures<'s>,
+}
+
+/// A material with its textures resolved.
+#[derive(Clone, Debug)]
+struct ShaderMaterial {
+    base_color: Vec4,
+    metallic: f32,
+    roughness: f32,
+    emissive: Vec3,
+    /// Reflectance at normal incidence by the index of refraction alone.
+    ior_reflectance: f32,
+    specular: f32,
+    specular_color: Vec3,
+    normal_scale: f32,
+    occlusion_strength: f32,
+    alpha_mode: AlphaMode,
+    unlit: bool,
+    textured: bool,
+    base_color_texture: Option<Texture>,
+    metallic_roughness_texture: Option<Texture>,
+    normal_texture: Option<Texture>,
+    occlusion_texture: Option<Texture>,
+    emissive_texture: Option<Texture>,
+    specular_texture: Option<Texture>,
+    specular_color_texture: Option<Texture>,
+}
+
+/// The texture references of a material that shading uses, with their encodings.
+fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 7] {
+    [
+        (material.base_color_texture, Encoding::Srgb),
+        (material.metallic_roughness_texture, Encoding::Linear),
+        (material.normal_texture, Encoding::Linear),
+        (material.occlusion_texture, Encoding::Linear),
+        (material.emissive_texture, Encoding::Srgb),
+        (material.specular_texture, Encoding::Linear),
+        (material.specular_color_texture, Encoding::Srgb),
+    ]
+}
+
+impl ShaderMaterial {
+    fn new(material: &Material, scene: &Scene, textures: &Textures) -> Self {
+        let resolved = references(material)
+            .map(|(reference, encoding)| reference.and_then(|r| textures.resolve(scene, &r, encoding)));
+        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
+        Self {
+            base_color: material.base_color,
+            metallic: material.metallic,
+            roughness: material.roughness,
+            emissive: material.emissive,
+            ior_reflectance: ratio * ratio,
+            specular: material.specular,
+            specular_color: material.specular_color,
+            normal_scale: material.normal_scale,
+            occlusion_strength: material.occlusion_strength,
+            alpha_mode: material.alpha_mode,
+            unlit: material.unlit,
+            textured: resolved.iter().any(Option::is_some),
+            base_color_texture: resolved[0],
+            metallic_roughness_texture: resolved[1],
+            normal_texture: resolved[2],
+            occlusion_texture: resolved[3],
+            emissive_texture: resolved[4],
+            specular_texture: resolved[5],
+            specular_color_texture: resolved[6],
+        }
+    }
+
+    fn coverage(&self, alpha: f32) -> f32 {
+        match self.alpha_mode {
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
+            AlphaMode::Blend => alpha.clamp(0.0, 1.0),
+        }
+    }
+}
+
+/// Corners of a triangle and their weights at a point.
+#[derive(Clone, Copy)]
+struct Corners {
+    vertices: [usize; 3],
+    weights: [f32; 3],
+}
+
+impl Corners {
+    #[inline]
+    fn new(geometry: &FrameGeometry, prim: u32, u: f32, v: f32) -> Self {
+        let vertices = geometry.indices[prim as usize].map(|i| i as usize);
+        Self {
+            vertices,
+            weights: [1.0 - u - v, u, v],
+        }
+    }
+
+    /// The corners' values of an attribute; `None` if no object has it.
+    #[inline]
+    fn values<T: Copy>(&self, attribute: &[T]) -> Option<[T; 3]> {
+        (!attribute.is_empty()).then(|| self.vertices.map(|i| attribute[i]))
+    }
+
+    #[inline]
+    fn mix<T>(&self, [a, b, c]: [T; 3]) -> T
+    where
+        T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>,
+    {
+        a * self.weights[0] + b * self.weights[1] + c * self.weights[2]
+    }
+}
+
+/// Texture coordinates of a point in one set.
+#[derive(Clone, Copy, Default)]
+struct Coordinates {
+    corners: [Vec2; 3],
+    at: Vec2,
+    /// Area of the pixel's footprint in texture coordinates.
+    area: f32,
+}
+
+impl Coordinates {
+    #[inline]
+    fn new(corners: &Corners, attribute: &[Vec2], footprint_share: f32) -> Self {
+        let Some(uvs) = corners.values(attribute) else {
+            return Self::default();
+        };
+        let area = (uvs[1] - uvs[0]).perp_dot(uvs[2] - uvs[0]).abs();
+        Self {
+            corners: uvs,
+            at: corners.mix(uvs),
+            area: area * footprint_share,
+        }
+    }
+}
+
+/// Texture lookups at one point.
+struct Lookup<'a> {
+    textures: &'a Textures<'a>,
+    sets: [Coordinates; 2],
+}
+
+impl Lookup<'_> {
+    #[inline]
+    fn set(&self, texture: &Texture) -> &Coordinates {
+        &self.sets[usize::from(texture.uv_set.min(1))]
+    }
+
+    /// The texel, or `None` without a texture.
+    #[inline]
+    fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
+        let texture = texture.as_ref()?;
+        let set = self.set(texture);
+        Some(self.textures.sample(texture, set.at, texture.level_of(set.area)))
+    }
+}
+
+impl<'s> Shader<'s> {
+    /// Resolves all materials and builds the mip pyramids of the textures they use.
+    pub fn new(scene: &'s Scene) -> Self {
+        let uses: Vec<_> = scene
+            .materials
+            .iter()
+            .flat_map(references)
+            .filter_map(|(reference, encoding)| Some((reference?, encoding)))
+            .collect();
+        let textures = Textures::new(scene, &uses);
+        let materials = scene
+            .materials
+            .par_iter()
+            .map(|m| ShaderMaterial::new(m, scene, &textures))
+            .collect();
+        Self { materials, textures }
+    }
+
+    /// Coverage of a material at a point: the alpha of [`Self::surface`] for a fraction of its cost, for rays
+    /// that pass through masked and blended surfaces. Textures are not filtered.
+    pub fn coverage(&self, geometry: &FrameGeometry, prim: u32, object: u32, u: f32, v: f32) -> f32 {
+        let material = self.material(geometry, object);
+        if material.alpha_mode == AlphaMode::Opaque {
+            return 1.0;
+        }
+        let corners = Corners::new(geometry, prim, u, v);
+        let lookup = self.lookup(geometry, &corners, material, 0.0);
+        material.coverage(base_color(geometry, &corners, material, &lookup).w)
+    }
+
+    /// The surface at a point.
+    ///
+    /// # Panics
+    /// If there is no such triangle or object, or the geometry is not of the shader's scene.
+    pub fn surface(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> Surface {
+        let material = self.material(geometry, point.object);
+        let corners = Corners::new(geometry, point.prim, point.u, point.v);
+        let positions = geometry.indices[point.prim as usize].map(|i| geometry.position(i));
+        let edges = [positions[1] - positions[0], positions[2] - positions[0]];
+        let plane = edges[0].as_dvec3().cross(edges[1].as_dvec3());
+        let outward = plane.normalize_or_zero().as_vec3();
+        let cos = outward.dot(point.view);
+        let front = cos >= 0.0;
+        let geometric_normal = if front { outward } else { -outward };
+
+        let pixel = point.footprint / cos.abs().max(1e-3);
+        let lookup = self.lookup(
+            geometry,
+            &corners,
+            material,
+            pixel * pixel / plane.length() as f32,
+        );
+        let base = base_color(geometry, &corners, material, &lookup);
+        let arm = lookup
+            .get(&material.metallic_roughness_texture)
+            .unwrap_or(Vec4::ONE);
+        let occlusion = lookup
+            .get(&material.occlusion_texture)
+            .map_or(1.0, |texel| texel.x);
+        let emission = lookup.get(&material.emissive_texture).unwrap_or(Vec4::ONE).xyz();
+        let specular = lookup
+            .get(&material.specular_texture)
+            .map_or(1.0, |texel| texel.w);
+        let specular_color = lookup
+            .get(&material.specular_color_texture)
+            .unwrap_or(Vec4::ONE)
+            .xyz();
+        Surface {
+            position: positions[0] + edges[0] * point.u + edges[1] * point.v,
+            geometric_normal,
+            normal: shading_normal(
+                geometry,
+                &corners,
+                material,
+                &lookup,
+                edges,
+                [outward, geometric_normal],
+            ),
+            view: point.view,
+            base_color: base.xyz(),
+            alpha: material.coverage(base.w),
+            metallic: (material.metallic * arm.z).clamp(0.0, 1.0),
+            roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
+            f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
+            specular: material.specular * specular,
+            emissive: material.emissive * emission,
+            occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
+            unlit: material.unlit,
+            front,
+        }
+    }
+
+    fn material(&self, geometry: &FrameGeometry, object: u32) -> &ShaderMaterial {
+        &self.materials[geometry.objects[object as usize].material as usize]
+    }
+
+    /// `footprint_share`: area of the pixel's footprint over the doubled area of the triangle.
+    #[inline]
+    fn lookup(
+        &self,
+        geometry: &FrameGeometry,
+        corners: &Corners,
+        material: &ShaderMaterial,
+        footprint_share: f32,
+    ) -> Lookup<'_> {
+        let attributes = &geometry.attributes;
+        let sets = if material.textured {
+            [&attributes.uvs, &attributes.uvs1].map(|uvs| Coordinates::new(corners, uvs, footprint_share))
+        } else {
+            [Coordinates::default(); 2]
+        };
+        Lookup {
+            textures: &self.textures,
+            sets,
+        }
+    }
+}
+
+/// Vertex colour, factor and texture.
+#[inline]
+fn base_color(
+    geometry: &FrameGeometry,
+    corners: &Corners,
+    material: &ShaderMaterial,
+    lookup: &Lookup,
+) -> Vec4 {
+    let vertex = corners
+        .values(&geometry.attributes.colors)
+        .map_or(Vec4::ONE, |colors| corners.mix(colors));
+    material.base_color * vertex * lookup.get(&material.base_color_texture).unwrap_or(Vec4::ONE)
+}
+
+/// The interpolated and bent normal, turned to the side of `facing`; `outward` where there are no normals.
+#[inline]
+fn shading_normal(
+    geometry: &FrameGeometry,
+    corners: &Corners,
+    material: &ShaderMaterial,
+    lookup: &Lookup,
+    edges: [Vec3; 2],
+    [outward, facing]: [Vec3; 2],
+) -> Vec3 {
+    let smooth = corners
+        .values(&geometry.attributes.normals)
+        .filter(|normals| normals.iter().all(|&n| n != Vec3::ZERO))
+        .and_then(|normals| corners.mix(normals).try_normalize());
+    let normal = smooth.unwrap_or(outward);
+    // The whole tangent frame is mirrored for a viewer on the other side.
+    let side = if normal.dot(facing) < 0.0 { -1.0 } else { 1.0 };
+    let Some(texture) = &material.normal_texture else {
+        return normal * side;
+    };
+    let Some(texel) = lookup.get(&material.normal_texture) else {
+        return normal * side;
+    };
+    let Some((tangent, handedness)) = tangent(geometry, corners, texture, lookup, edges, normal) else {
+        return normal * side;
+    };
+    let bent = (texel.xyz() * 2.0 - Vec3::ONE) * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
+    let bitangent = normal.cross(tangent) * handedness;
+    (tangent * bent.x + bitangent * bent.y + normal * bent.z).normalize_or(normal) * side
+}
+
+/// Unit tangent perpendicular to the normal, and the sign of the bitangent `normal x tangent`. glTF's texture
+/// coordinates have v downwards and its normal maps green upwards, so an unmirrored map has the sign +1.
+#[inline]
+fn tangent(
+    geometry: &FrameGeometry,
+    corners: &Corners,
+    texture: &Texture,
+    lookup: &Lookup,
+    edges: [Vec3; 2],
+    normal: Vec3,
+) -> Option<(Vec3, f32)> {
+    let given = corners
+        .values(&geometry.attributes.tangents)
+        .filter(|ts| ts.iter().all(|t| t.w != 0.0));
+    let (along, handedness) = match given {
+        Some(tangents) => (corners.mix(tangents).xyz(), tangents[0].w.signum()),
+        None => {
+            let uvs = lookup.set(texture).corners.map(|uv| texture.transform(uv));
+            let (d1, d2) = (uvs[1] - uvs[0], uvs[2] - uvs[0]);
+            // Scaled by the square of the determinant, which normalising removes; only its sign matters.
+            let sign = d1.perp_dot(d2).signum();
+            let along_u = (edges[0] * d2.y - edges[1] * d1.y) * sign;
+            let along_v = (edges[1] * d1.x - edges[0] * d2.x) * sign;
+            (along_u, -normal.cross(along_u).dot(along_v).signum())
+        }
+    };
+    let tangent = (along - normal * normal.dot(along)).try_normalize()?;
+    Some((tangent, handedness))
+}
