@@ -9,6 +9,7 @@
 
 pub mod builtin;
 mod camera_file;
+mod defaults;
 mod error;
 mod frame;
 mod load;
@@ -16,7 +17,8 @@ mod material;
 mod pose;
 mod scene;
 
-pub use camera_file::{CameraEntry, read_camera_file};
+pub use camera_file::{AreaLight, CameraEntry, find_camera, point_light_for, read_camera_file};
+pub use defaults::{default_camera, default_lights};
 pub use error::{Error, Notice};
 pub use frame::{FrameGeometry, ObjectRange, PosedCamera, PosedLight, VertexAttributes};
 pub use load::{LoadOptions, UpAxis, load};

@@ -31,7 +31,10 @@ pub struct LoadOptions {
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { up: UpAxis::Y, scale: 1.0 }
+        Self {
+            up: UpAxis::Y,
+            scale: 1.0,
+        }
     }
 }
 
@@ -59,9 +62,15 @@ enum Format {
 /// # Errors
 /// One of [`Error`], naming the file and the place in it.
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
-    let (mut file, size) = open(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    let (mut file, size) = open(path).map_err(|source| Error::Io {
+        path: path.into(),
+        source,
+    })?;
     if size == 0 {
-        return Err(Error::Empty { path: path.into(), detail: "the file has 0 bytes".into() });
+        return Err(Error::Empty {
+            path: path.into(),
+            detail: "the file has 0 bytes".into(),
+        });
     }
     if size > MAX_FILE_BYTES {
         return Err(Error::TooLarge {
@@ -72,14 +81,20 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
         });
     }
     let mut head = [0; 64];
-    let length = read_head(&mut file, &mut head).map_err(|source| Error::Io { path: path.into(), source })?;
+    let length = read_head(&mut file, &mut head).map_err(|source| Error::Io {
+        path: path.into(),
+        source,
+    })?;
     drop(file);
     match format_of(path, &head[..length]) {
         Ok(Format::Gltf) => gltf::load(path, options),
         Ok(Format::Obj) => obj::load(path, options),
         Ok(Format::Ply) => ply::load(path, options),
         Ok(Format::Stl) => stl::load(path, options),
-        Err(found) => Err(Error::UnknownFormat { path: path.into(), found }),
+        Err(found) => Err(Error::UnknownFormat {
+            path: path.into(),
+            found,
+        }),
     }
 }
 
@@ -90,13 +105,16 @@ fn open(path: &Path) -> io::Result<(File, u64)> {
         return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a directory"));
     }
     if !kind.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+        return Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "it is not a regular file",
+        ));
     }
     Ok((File::open(path)?, kind.len()))
 }
 
 /// Reads a whole regular file of up to [`MAX_FILE_BYTES`].
-fn read_file(path: &Path) -> io::Result<Vec<u8>> {
+pub(crate) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     let (file, size) = open(path)?;
     if size > MAX_FILE_BYTES {
         let message = format!("its {size} bytes are over the limit of {MAX_FILE_BYTES}");
@@ -128,7 +146,11 @@ fn format_of(path: &Path, head: &[u8]) -> Result<Format, String> {
     if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") {
         return Ok(Format::Ply);
     }
-    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let ending = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or("")
+        .to_ascii_lowercase();
     match ending.as_str() {
         "glb" | "gltf" => return Ok(Format::Gltf),
         "obj" => return Ok(Format::Obj),

@@ -55,6 +55,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
             file.faces.len()
         )));
     }
+    notices.extend(library.notices());
     scene.meshes[0].primitives = primitives;
     scene.notices = notices;
     Ok(scene)

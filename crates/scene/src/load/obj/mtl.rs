@@ -17,16 +17,17 @@
 //!
 //! Only materials that faces use are looked at: a texture that such a material names has to exist.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use glam::{Vec2, Vec3};
 
 use super::{decode, float, logical_lines, words};
-use crate::load::plain::{Source, default_material};
+use crate::load::plain::{Source, counted, default_material};
 use crate::{AlphaMode, Error, Image, Material, Notice, Sampler, Scene, TextureRef, TextureTransform, Wrap};
 
 /// Largest width and height of a texture, and the memory it may take.
-const MAX_TEXTURE_SIDE: u32 = 32768;
+const MAX_TEXTURE_SIDE: u32 = 16384;
 const MAX_TEXTURE_BYTES: u64 = 4 << 30;
 
 /// All materials of the libraries of one OBJ file.
@@ -35,6 +36,8 @@ pub(super) struct Library {
     entries: Vec<Entry>,
     /// Index in the scene of each image that was loaded, by file.
     images: Vec<(PathBuf, usize)>,
+    /// Statements without a counterpart here, and in how many materials.
+    skipped: BTreeMap<String, usize>,
 }
 
 /// One `newmtl` block, as it is in the file.
@@ -128,6 +131,12 @@ impl Library {
         scene.materials.push(material);
         self.entries[entry].used_as = Some(scene.materials.len() - 1);
         Ok(scene.materials.len() - 1)
+    }
+
+    /// What was left out of the materials asked for.
+    pub(super) fn notices(&self) -> impl Iterator<Item = Notice> {
+        let say = |(keyword, &n): (&String, &usize)| counted(n, "materials", &format!("{keyword} skipped"));
+        self.skipped.iter().filter_map(say)
     }
 }
 
