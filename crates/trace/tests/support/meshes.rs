@@ -204,6 +204,15 @@ pub fn sheet(n: u32) -> Mesh {
     Mesh::new(&format!("sheet {n}"), &positions, indices)
 }
 
+/// Large triangles with small whole coordinates, so that rays can lie exactly in their planes or miss that by a
+/// hair that f64 cannot resolve beside the other terms.
+pub fn lattice(seed: u64, count: usize) -> Mesh {
+    let mut random = Random::new(seed);
+    let positions: Vec<Vec3> = (0..3 * count).map(|_| (random.in_cube() * 8.0).round()).collect();
+    let indices = (0..count as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    Mesh::new(&format!("lattice (seed {seed})"), &positions, indices)
+}
+
 /// Every mesh of the conformance table.
 pub fn table() -> Vec<Mesh> {
     let mut meshes = vec![
@@ -220,6 +229,8 @@ pub fn table() -> Vec<Mesh> {
         fans(5, 12, 40),
         duplicates(6, 150),
         sheet(12),
+        lattice(10, 60),
+        lattice(11, 600),
         ground(1e4).and(&icosphere(2).placed(1e-2, Vec3::new(0.3, -0.9, 0.2))),
         ground(1e6).and(&soup(7, 100, 0.2)),
         broken(8),

@@ -15,11 +15,7 @@ fn bounds(mesh: &Mesh) -> (Vec3, Vec3) {
 
 /// A point of the mesh at which neighbours meet or which is otherwise special.
 fn target(mesh: &Mesh, random: &mut Random) -> Vec3 {
-    if mesh.indices.is_empty() {
-        return random.in_cube();
-    }
-    let corners = mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.triangles().vertex(i));
-    let [a, b, c] = corners;
+    let [a, b, c] = corners(mesh, random);
     match random.below(5) {
         0 => a,
         1 => (a + b) * 0.5,
@@ -32,13 +28,40 @@ fn target(mesh: &Mesh, random: &mut Random) -> Vec3 {
     }
 }
 
+/// Corners of some triangle; of a made-up one if there is none.
+fn corners(mesh: &Mesh, random: &mut Random) -> [Vec3; 3] {
+    if mesh.indices.is_empty() {
+        return [Vec3::ZERO, Vec3::X, Vec3::Y];
+    }
+    mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.triangles().vertex(i))
+}
+
+/// A ray in a triangle's plane but for rounding; half of the time through points of the lattice that its edges
+/// span, with zero components made minute.
+fn in_plane([a, b, c]: [Vec3; 3], random: &mut Random) -> Ray {
+    let exact = random.below(2) == 0;
+    let mut share = || {
+        let s = random.signed() * 4.0;
+        if exact { s.round() } else { s }
+    };
+    let from = a + (b - a) * share() + (c - a) * share();
+    let mut ray = aimed(from, a + (b - a) * share() + (c - a) * share());
+    if exact {
+        let axis = random.below(3);
+        if ray.dir[axis] == 0.0 {
+            ray.dir[axis] = 10f32.powi(-(random.below(30) as i32));
+        }
+    }
+    ray
+}
+
 /// `count` rays of every kind the suite knows.
 pub fn adversarial(mesh: &Mesh, seed: u64, count: usize) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let (centre, half) = bounds(mesh);
     let within = |random: &mut Random| centre + half * random.in_cube();
     let around = |random: &mut Random| centre + half * random.in_cube() * 3.0;
-    (0..count).map(|i| one(mesh, i, &mut random, &within, &around)).collect()
+    (0..count).map(|kind| one(mesh, kind, &mut random, &within, &around)).collect()
 }
 
 fn one(
@@ -63,24 +86,10 @@ fn one(
         3 | 4 => aimed(around(random), target),
         5 => aimed(within(random), target),
         6 => aimed(target, within(random)),
-        // In a triangle's plane, or nearly.
-        7 => {
-            let corners = if mesh.indices.is_empty() {
-                [Vec3::ZERO, Vec3::X, Vec3::Y]
-            } else {
-                mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.triangles().vertex(i))
-            };
-            let [a, b, c] = corners;
-            let from = a + (b - a) * (random.signed() * 4.0) + (c - a) * (random.signed() * 4.0);
-            aimed(from, a + (b - a) * random.unit())
-        }
+        7 => in_plane(corners(mesh, random), random),
         // Along an edge, from one end or from before it.
         8 => {
-            let [a, b, _] = if mesh.indices.is_empty() {
-                [Vec3::ZERO; 3]
-            } else {
-                mesh.indices[random.below(mesh.indices.len())].map(|i| mesh.triangles().vertex(i))
-            };
+            let [a, b, _] = corners(mesh, random);
             aimed(a - (b - a) * random.below(2) as f32, b)
         }
         // Far away.
