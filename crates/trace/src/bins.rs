@@ -84,6 +84,24 @@ impl Bins {
             .map(move |chunk| &chunk.refs[chunk.starts[cell] as usize..chunk.starts[cell + 1] as usize])
     }
 
+    /// Renumbers the references from triangle ids to positions in the returned list of the triangles that are
+    /// referred to at all, in ascending order.
+    pub(crate) fn number_references(&mut self, triangles: usize) -> Vec<u32> {
+        let mut number = vec![0u32; triangles];
+        for &prim in self.chunks.iter().flat_map(|c| &c.refs) {
+            number[prim as usize] = 1;
+        }
+        let mut prims = Vec::new();
+        for (prim, number) in number.iter_mut().enumerate() {
+            if *number != 0 {
+                *number = prims.len() as u32;
+                prims.push(prim as u32);
+            }
+        }
+        self.chunks.par_iter_mut().flat_map(|c| &mut c.refs).for_each(|r| *r = number[*r as usize]);
+        prims
+    }
+
     /// References in all cells.
     pub(crate) fn reference_count(&self) -> usize {
         self.chunks.iter().map(|c| c.refs.len()).sum()

@@ -20,17 +20,26 @@ mod bvh;
 pub mod exact;
 mod eye_grid;
 mod kernel;
+mod light_grid;
+mod light_views;
 mod precise;
 mod ray;
+#[cfg(test)]
+mod test_meshes;
+pub mod topology;
 mod triangles;
 pub mod view;
 
 pub use bins::Binning;
 pub use eye_grid::{EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use kernel::SimdLevel;
+pub use light_grid::{
+    Casters, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
+};
 pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;
 pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
+pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};

@@ -41,6 +41,8 @@ pub struct View {
     pub scale_x: f64,
     /// As `scale_x`, for y.
     pub scale_y: f64,
+    /// Raster point of the ray along `forward`.
+    pub middle: [f64; 2],
     /// Raster width.
     pub width: u32,
     /// Raster height.
@@ -79,6 +81,7 @@ impl View {
             forward,
             scale_x: f64::from(width) / (2.0 * tan[0]),
             scale_y: f64::from(height) / (2.0 * tan[1]),
+            middle: [f64::from(width) * 0.5, f64::from(height) * 0.5],
             width,
             height,
             arrangement: Arrangement::Perspective,
@@ -91,15 +94,23 @@ impl View {
         Self { arrangement, ..Self::perspective(center, axes, half, size) }
     }
 
-    /// The middle of the raster.
-    pub fn middle(&self) -> [f64; 2] {
-        [f64::from(self.width) * 0.5, f64::from(self.height) * 0.5]
+    /// The same rays on a raster of `size` that shows only the window from `min` to `max` of this raster.
+    pub fn window(&self, min: [f64; 2], max: [f64; 2], size: [u32; 2]) -> Self {
+        let zoom = [0, 1].map(|i| f64::from(size[i]) / (max[i] - min[i]));
+        Self {
+            scale_x: self.scale_x * zoom[0],
+            scale_y: self.scale_y * zoom[1],
+            middle: [0, 1].map(|i| (self.middle[i] - min[i]) * zoom[i]),
+            width: size[0],
+            height: size[1],
+            ..*self
+        }
     }
 
     /// The ray through raster point (x, y).
     #[inline]
     pub fn ray(&self, x: f64, y: f64) -> ViewRay {
-        let [cx, cy] = self.middle();
+        let [cx, cy] = self.middle;
         let offset = self.right * ((x - cx) / self.scale_x) + self.up * ((cy - y) / self.scale_y);
         let center = self.center.as_dvec3();
         match self.arrangement {
@@ -123,7 +134,7 @@ impl View {
             Arrangement::Perspective => (depth, 1.0),
             Arrangement::Parallel { reach } => (1.0, reach - depth),
         };
-        let [cx, cy] = self.middle();
+        let [cx, cy] = self.middle;
         let x = a.dot(self.right) * self.scale_x + cx * w;
         let y = cy * w - a.dot(self.up) * self.scale_y;
         Homogeneous { p: DVec3::new(x, y, w), m }

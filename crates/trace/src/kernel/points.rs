@@ -3,9 +3,9 @@
 //!
 //! Cost: about 25 vector instructions for sixteen points and one triangle.
 
-use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
 
-use super::edges::EdgeRecord;
+use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
 use super::{LANES, NEARNESS_BAND, SimdLevel};
 
 /// A caster: its record relative to `origin`, a raster point of its own. 80 bytes.
@@ -24,32 +24,38 @@ pub(crate) struct PointLanes {
     pub(crate) nearness: [f32; LANES],
     /// The triangle each point lies on, which does not shadow it.
     pub(crate) own: [u32; LANES],
-    pub(crate) count: usize,
 }
 
 impl Default for PointLanes {
     fn default() -> Self {
-        Self { x: [0.0; LANES], y: [0.0; LANES], nearness: [0.0; LANES], own: [0; LANES], count: 0 }
+        Self { x: [0.0; LANES], y: [0.0; LANES], nearness: [0.0; LANES], own: [0; LANES] }
     }
 }
 
-/// Tests the points against the casters `refs` until all are shadowed. Returns a bit for every point that
-/// certainly is; `unsure(lane, prim)` is told of pairs that f32 could not tell, whether or not the point is
-/// found in shadow later.
+/// Sets up sixteen casters.
+pub(crate) fn set_up_casters(level: SimdLevel, vertices: &VertexLanes, origin: Origin, out: &mut EdgeLanes) {
+    dispatch!(level.0, simd => set_up(simd, vertices, origin, out));
+}
+
+/// Tests the `open` points (a bit each) against the casters `refs` until all are shadowed. Returns those that are
+/// still open; `unsure` collects pairs of lane and triangle that f32 could not tell, whether or not the point
+/// is found in shadow later.
 pub(crate) fn shadowed(
     level: SimdLevel,
     points: &PointLanes,
+    open: u32,
     casters: &[Caster],
     refs: &[u32],
     unsure: &mut Vec<(u32, u32)>,
 ) -> u32 {
-    dispatch!(level.0, simd => shadowed_impl(simd, points, casters, refs, unsure))
+    dispatch!(level.0, simd => shadowed_impl(simd, points, open, casters, refs, unsure))
 }
 
 #[inline(always)]
 fn shadowed_impl<S: Simd>(
     simd: S,
     points: &PointLanes,
+    mut open: u32,
     casters: &[Caster],
     refs: &[u32],
     unsure: &mut Vec<(u32, u32)>,
@@ -59,8 +65,6 @@ fn shadowed_impl<S: Simd>(
     let y = f32x16::from_slice(simd, &points.y);
     let nearness = f32x16::from_slice(simd, &points.nearness);
     let (nearer, farther) = (splat(1.0 - NEARNESS_BAND), splat(1.0 + NEARNESS_BAND));
-    let all = u32::MAX >> (32 - points.count as u32);
-    let mut open = all;
     for &r in refs {
         let Caster { record, origin } = &casters[r as usize];
         let (px, py) = (x - splat(origin[0]), y - splat(origin[1]));
@@ -78,9 +82,8 @@ fn shadowed_impl<S: Simd>(
         if candidates == 0 {
             continue;
         }
-        for lane in 0..points.count {
-            candidates &= !(u32::from(points.own[lane] == record.prim) << lane);
-        }
+        let own = u32x16::from_slice(simd, &points.own).simd_eq(u32x16::splat(simd, record.prim));
+        candidates &= !(own.to_bitmask() as u32);
         let sure = inside.simd_gt(splat(1.0)) & (n * nearer).simd_gt(nearness) & !vague;
         let sure = sure.to_bitmask() as u32 & candidates;
         open &= !sure;
@@ -93,5 +96,5 @@ fn shadowed_impl<S: Simd>(
             break;
         }
     }
-    all & !open
+    open
 }

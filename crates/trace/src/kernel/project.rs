@@ -81,7 +81,7 @@ fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<
     let a = [points[0] - splat(center.x), points[1] - splat(center.y), points[2] - splat(center.z)];
     let dot = |axis: glam::DVec3| a[0] * splat(axis.x) + a[1] * splat(axis.y) + a[2] * splat(axis.z);
     let (along, above, depth) = (dot(view.right), dot(view.up), dot(view.forward));
-    let [cx, cy] = view.middle();
+    let [cx, cy] = view.middle;
     match view.arrangement {
         Arrangement::Perspective => {
             let inverse = splat(1.0) / depth;
