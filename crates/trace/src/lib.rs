@@ -27,6 +27,7 @@ mod ray;
 #[cfg(test)]
 mod test_meshes;
 pub mod topology;
+pub mod topology;
 mod triangles;
 pub mod view;
 
@@ -40,6 +41,7 @@ pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;
 pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
+pub use topology::Topology;
 pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};
