@@ -43,6 +43,55 @@ impl Layers {
     };
 }
 
+/// One layer of a film.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum LayerKind {
+    /// Linear colour.
+    Color,
+    /// See [`Layers::alpha`].
+    Alpha,
+    /// See [`Layers::depth`].
+    Depth,
+    /// See [`Layers::distance`].
+    Distance,
+    /// See [`Layers::normal`].
+    Normal,
+    /// See [`Layers::object`].
+    Object,
+    /// See [`Layers::prim`].
+    Prim,
+    /// See [`Layers::bary`].
+    Bary,
+}
+
+impl LayerKind {
+    /// Every kind of layer.
+    pub const ALL: [Self; 8] = [
+        Self::Color,
+        Self::Alpha,
+        Self::Depth,
+        Self::Distance,
+        Self::Normal,
+        Self::Object,
+        Self::Prim,
+        Self::Bary,
+    ];
+
+    /// The layer's name in files and on command lines.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Color => "color",
+            Self::Alpha => "alpha",
+            Self::Depth => "depth",
+            Self::Distance => "distance",
+            Self::Normal => "normal",
+            Self::Object => "object",
+            Self::Prim => "prim",
+            Self::Bary => "bary",
+        }
+    }
+}
+
 /// The object and triangle index of pixels that see no surface.
 pub const NO_ID: u32 = u32::MAX;
 
@@ -152,6 +201,20 @@ impl Film {
     /// The layers it holds.
     pub fn layers(&self) -> Layers {
         self.layers
+    }
+
+    /// Whether it holds this layer.
+    pub fn holds(&self, layer: LayerKind) -> bool {
+        match layer {
+            LayerKind::Color => true,
+            LayerKind::Alpha => self.layers.alpha,
+            LayerKind::Depth => self.layers.depth,
+            LayerKind::Distance => self.layers.distance,
+            LayerKind::Normal => self.layers.normal,
+            LayerKind::Object => self.layers.object,
+            LayerKind::Prim => self.layers.prim,
+            LayerKind::Bary => self.layers.bary,
+        }
     }
 
     /// Splits the film into tiles of at most `tile_width` x `tile_height` pixels, row by row from the top left;

@@ -7,12 +7,14 @@
 mod camera;
 mod error;
 mod film;
+pub mod image_io;
 pub mod shade;
 pub mod texture;
 pub mod tonemap;
 
 pub use camera::CameraFrame;
 pub use error::{Error, Result};
-pub use film::{Film, Layers, NO_ID, Sample, TileMut};
+pub use film::{Film, LayerKind, Layers, NO_ID, Sample, TileMut};
+pub use image_io::{Picture, read_picture};
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};

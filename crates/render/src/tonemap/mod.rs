@@ -13,7 +13,7 @@ mod srgb;
 use glam::Vec3;
 use rayon::prelude::*;
 
-pub(crate) use srgb::{decode_srgb, linear_from_srgb8};
+pub(crate) use srgb::{decode_srgb, encode_srgb, linear_from_srgb8};
 pub use srgb::{decode_srgb8, encode_srgb8};
 
 use crate::Film;

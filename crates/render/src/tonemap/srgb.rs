@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 /// Encoded value of a linear one, both in \[0, 1\].
-fn encode(linear: f64) -> f64 {
+pub(crate) fn encode_srgb(linear: f64) -> f64 {
     if linear <= 0.003_130_8 {
         12.92 * linear
     } else {
@@ -26,7 +26,7 @@ pub(crate) fn decode_srgb(encoded: f64) -> f64 {
 
 /// The byte by the formula: round(255 encode(x)), halves up.
 fn encode_by_formula(linear: f32) -> u8 {
-    (255.0 * encode(f64::from(linear)) + 0.5) as u8
+    (255.0 * encode_srgb(f64::from(linear)) + 0.5) as u8
 }
 
 /// Mantissa bits that take part in the bucket's index: 256 buckets an octave, 67 steps in the last octave.

@@ -1,0 +1,61 @@
+//! Files as wholes: read at once, written beside their place and renamed.
+
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Seek, Write};
+use std::path::Path;
+
+use crate::{Error, Result};
+
+/// What encoders write to.
+pub(super) trait Sink: Write + Seek {}
+impl<T: Write + Seek> Sink for T {}
+
+/// Fills the file at `path` by `encode`. An existing file is replaced only when all is written; symbolic links
+/// are followed, devices and pipes are written directly.
+pub(super) fn write(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>) -> Result<()> {
+    write_inner(path, encode).map_err(|source| Error::write(path, source))
+}
+
+fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>) -> io::Result<()> {
+    let resolved = fs::canonicalize(path);
+    let target = resolved.as_deref().unwrap_or(path);
+    match fs::metadata(target) {
+        Ok(found) if found.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
+        Ok(found) if !found.is_file() => {
+            // A pipe cannot seek, so the whole is made first.
+            let mut bytes = io::Cursor::new(Vec::new());
+            encode(&mut bytes)?;
+            return File::options()
+                .write(true)
+                .open(target)?
+                .write_all(bytes.get_ref());
+        }
+        Ok(found) if found.permissions().readonly() => return Err(io::ErrorKind::PermissionDenied.into()),
+        _ => {}
+    }
+    let folder = match target.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".rayward-");
+    #[cfg(unix)]
+    {
+        // The mode of any new file, reduced by the umask, instead of the private mode of temporary ones.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    let mut buffered = BufWriter::with_capacity(1 << 16, builder.tempfile_in(folder)?);
+    encode(&mut buffered)?;
+    buffered
+        .into_inner()
+        .map_err(io::IntoInnerError::into_error)?
+        .persist(target)
+        .map_err(|e| e.error)?;
+    Ok(())
+}
+
+/// The whole content of a file.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+    fs::read(path).map_err(|source| Error::read(path, source))
+}

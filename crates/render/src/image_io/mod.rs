@@ -1,0 +1,26 @@
+//! Images in and out of files.
+//!
+//! | format | written | read | values |
+//! |---|---|---|---|
+//! | PNG | 8 bit RGB, tagged sRGB | 8 and 16 bit, all colour types | sRGB encoded |
+//! | JPEG | | 8 bit | sRGB encoded |
+//! | EXR | all layers of a film, f32 and u32, ZIP | R, G, B, A or Y of the first part that has them | linear |
+//! | NPY | one layer of a film | `(h, w)`, `(h, w, 1..=4)`; bool, integers, floats | linear; `u1` sRGB encoded |
+//! | HDR | | RGBE | linear |
+//! | PFM | | both endians | linear |
+//!
+//! Row 0 is on top in memory, whatever the file says. Writers fill a temporary file beside the target and rename
+//! it: a file is there as a whole or not at all. Readers know a format by its first bytes, and believe no size
+//! before the file is long enough for it.
+
+mod exr;
+mod file;
+mod npy;
+mod pfm;
+mod picture;
+mod png;
+
+pub use exr::{encode_exr, write_exr};
+pub use npy::{encode_npy, write_npy};
+pub use picture::{Picture, read_picture};
+pub use png::{encode_png, write_png};

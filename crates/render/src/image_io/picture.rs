@@ -1,0 +1,141 @@
+//! An image as read from a file, whatever its format.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use glam::Vec4;
+use image::DynamicImage;
+
+use super::{exr, file, npy, pfm};
+use crate::tonemap::{decode_srgb, encode_srgb};
+use crate::{Error, Film, Result};
+
+/// Pixels in the values of their file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Red, green, blue, alpha; `width * height` of them, row 0 on top. Grey is in all three, missing alpha is 1.
+    pub pixels: Vec<Vec4>,
+    /// Whether colours are sRGB encoded; linear otherwise.
+    pub srgb: bool,
+}
+
+impl Picture {
+    /// The same picture with sRGB encoded colours; linear ones are cut off at 0 and 1 first.
+    pub fn to_srgb(&self) -> Self {
+        if self.srgb {
+            self.clone()
+        } else {
+            self.converted(true, |linear| encode_srgb(linear.clamp(0.0, 1.0)))
+        }
+    }
+
+    /// The same picture with linear colours.
+    pub fn to_linear(&self) -> Self {
+        if self.srgb {
+            self.converted(false, decode_srgb)
+        } else {
+            self.clone()
+        }
+    }
+
+    fn converted(&self, srgb: bool, transfer: impl Fn(f64) -> f64) -> Self {
+        let value = |v: f32| transfer(f64::from(v)) as f32;
+        let pixels = self
+            .pixels
+            .iter()
+            .map(|p| Vec4::new(value(p.x), value(p.y), value(p.z), p.w))
+            .collect();
+        Self {
+            pixels,
+            srgb,
+            ..*self
+        }
+    }
+}
+
+impl From<&Film> for Picture {
+    fn from(film: &Film) -> Self {
+        let alpha = film.alpha.iter().copied().chain(std::iter::repeat(1.0));
+        let pixels = film
+            .color
+            .iter()
+            .zip(alpha)
+            .map(|(color, alpha)| color.extend(alpha))
+            .collect();
+        Self {
+            width: film.width(),
+            height: film.height(),
+            pixels,
+            srgb: false,
+        }
+    }
+}
+
+/// Reads an image; its format is known by its first bytes.
+///
+/// # Errors
+/// [`Error::Read`] for what the system says, [`Error::UnknownImageFormat`], [`Error::MalformedImage`].
+pub fn read_picture(path: &Path) -> Result<Picture> {
+    let bytes = file::read(path)?;
+    match bytes.get(..4) {
+        Some(b"\x76\x2f\x31\x01") => exr::decode(path, &bytes),
+        _ if npy::is_npy(&bytes) => npy::decode(path, &bytes),
+        _ if pfm::is_pfm(&bytes) => pfm::decode(path, &bytes),
+        _ => decode(path, &bytes),
+    }
+}
+
+/// PNG, JPEG and HDR.
+fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    let mut reader = image::ImageReader::new(Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|source| Error::read(path, source))?;
+    if reader.format().is_none() {
+        return Err(Error::UnknownImageFormat {
+            path: path.into(),
+            known: "PNG, JPEG, EXR, HDR, NPY and PFM",
+        });
+    }
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(8 << 30);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|error| Error::malformed(path, error))?;
+    let (width, height) = (image.width(), image.height());
+    let (pixels, srgb) = match &image {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => (
+            image.into_rgba32f().pixels().map(|p| Vec4::from(p.0)).collect(),
+            false,
+        ),
+        DynamicImage::ImageLuma16(_)
+        | DynamicImage::ImageLumaA16(_)
+        | DynamicImage::ImageRgb16(_)
+        | DynamicImage::ImageRgba16(_) => {
+            let rgba = image.into_rgba16();
+            (
+                rgba.pixels()
+                    .map(|p| Vec4::from(p.0.map(|v| f32::from(v) / 65535.0)))
+                    .collect(),
+                true,
+            )
+        }
+        _ => {
+            let rgba = image.into_rgba8();
+            (
+                rgba.pixels()
+                    .map(|p| Vec4::from(p.0.map(|v| f32::from(v) / 255.0)))
+                    .collect(),
+                true,
+            )
+        }
+    };
+    Ok(Picture {
+        width,
+        height,
+        pixels,
+        srgb,
+    })
+}
