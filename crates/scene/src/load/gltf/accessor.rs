@@ -81,7 +81,9 @@ impl Source<'_> {
             return Ok((Cow::Owned(vec![0; count as usize * size]), size));
         };
         let view = self.view(view_index, place)?;
-        let stride = self.root.buffer_views[view_index.value()].byte_stride.map_or(size, |stride| stride.0);
+        let stride = self.root.buffer_views[view_index.value()]
+            .byte_stride
+            .map_or(size, |stride| stride.0);
         if stride < size || stride > 1 << 16 {
             let problem = format!("byteStride is {stride}, an element has {size} bytes");
             return Err(self.malformed(place, problem));
@@ -100,22 +102,39 @@ impl Source<'_> {
     }
 
     /// Replaces the elements that the accessor's sparse part names.
-    fn apply_sparse(&self, accessor: &Accessor, size: usize, elements: &mut Elements<'_>) -> Result<(), Error> {
-        let Some(sparse) = &accessor.sparse else { return Ok(()) };
+    fn apply_sparse(
+        &self,
+        accessor: &Accessor,
+        size: usize,
+        elements: &mut Elements<'_>,
+    ) -> Result<(), Error> {
+        let Some(sparse) = &accessor.sparse else {
+            return Ok(());
+        };
         let place = format!("{}, sparse", elements.place);
-        let kind = self.valid(&sparse.indices.component_type, "componentType", &place)?.0;
+        let kind = self
+            .valid(&sparse.indices.component_type, "componentType", &place)?
+            .0;
         let count = sparse.count.0;
         let part = |view, start: u64, size: usize| -> Result<&[u8], Error> {
             let bytes = self.view(view, &place)?;
-            let needed = count.checked_mul(size as u64).and_then(|length| span(bytes, start, length));
+            let needed = count
+                .checked_mul(size as u64)
+                .and_then(|length| span(bytes, start, length));
             needed.ok_or_else(|| {
                 let problem = format!("{count} entries of {size} bytes do not fit into its bufferView");
                 self.malformed(&place, problem)
             })
         };
-        let indices = part(sparse.indices.buffer_view, sparse.indices.byte_offset.0, kind.size())?;
+        let indices = part(
+            sparse.indices.buffer_view,
+            sparse.indices.byte_offset.0,
+            kind.size(),
+        )?;
         let values = part(sparse.values.buffer_view, sparse.values.byte_offset.0, size)?;
-        let indices = indices.chunks_exact(kind.size()).map(|bytes| integer(kind, bytes) as usize);
+        let indices = indices
+            .chunks_exact(kind.size())
+            .map(|bytes| integer(kind, bytes) as usize);
         let stride = elements.stride;
         let bytes = elements.bytes.to_mut();
         for (entry, (i, value)) in indices.zip(values.chunks_exact(size)).enumerate() {
@@ -131,7 +150,9 @@ impl Source<'_> {
     /// The accessor index in a JSON value of an extension.
     pub(super) fn accessor_index(&self, value: &Value, place: &str) -> Result<Index<Accessor>, Error> {
         let index = value.as_u64().and_then(|i| u32::try_from(i).ok());
-        index.map(Index::new).ok_or_else(|| self.malformed(place, format!("{value} is not an accessor index")))
+        index
+            .map(Index::new)
+            .ok_or_else(|| self.malformed(place, format!("{value} is not an accessor index")))
     }
 }
 
@@ -156,11 +177,18 @@ impl Elements<'_> {
 
     /// Whether components are unsigned integers.
     pub(super) fn is_unsigned(&self) -> bool {
-        matches!(self.kind, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
+        matches!(
+            self.kind,
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+        )
     }
 
     /// All elements as `map` of their numbers, or those that `pick` names.
-    pub(super) fn gather<const N: usize, T>(&self, pick: Option<&[u32]>, map: impl Fn([f32; N]) -> T) -> Vec<T> {
+    pub(super) fn gather<const N: usize, T>(
+        &self,
+        pick: Option<&[u32]>,
+        map: impl Fn([f32; N]) -> T,
+    ) -> Vec<T> {
         match pick {
             Some(pick) => pick.iter().map(|&i| map(self.floats(i as usize))).collect(),
             None => (0..self.count).map(|i| map(self.floats(i))).collect(),
@@ -178,7 +206,11 @@ fn number(kind: ComponentType, normalized: bool, bytes: &[u8]) -> f32 {
         (ComponentType::U16, _) => (integer(kind, bytes) as f32, 65535.0),
         _ => (integer(kind, bytes) as f32, u32::MAX as f32),
     };
-    if normalized { (value / unit).max(-1.0) } else { value }
+    if normalized {
+        (value / unit).max(-1.0)
+    } else {
+        value
+    }
 }
 
 /// A component of unsigned kind.

@@ -23,6 +23,32 @@ const KNOWN_EXTENSIONS: &[&str] = &[
     "KHR_texture_transform",
 ];
 
+/// Names of properties that hold an index.
+const INDICES: &[&str] = &[
+    "NORMAL",
+    "POSITION",
+    "TANGENT",
+    "buffer",
+    "bufferView",
+    "camera",
+    "index",
+    "indices",
+    "input",
+    "inverseBindMatrices",
+    "light",
+    "material",
+    "mesh",
+    "node",
+    "output",
+    "sampler",
+    "scene",
+    "skeleton",
+    "skin",
+    "source",
+];
+/// Names of properties that hold a list of indices (or, at the top, of objects).
+const INDEX_LISTS: &[&str] = &["children", "joints", "nodes"];
+
 /// A parsed file whose references are not resolved yet.
 pub(super) struct Container<'a> {
     pub(super) root: Root,
@@ -55,14 +81,22 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], notices: &mut Notices) -> 
         }
     })?;
     check_extensions(path, &root, notices)?;
-    Ok(Container { root, light_radii, bin })
+    Ok(Container {
+        root,
+        light_radii,
+        bin,
+    })
 }
 
 fn json_error(path: &Path, error: &serde_json::Error) -> Error {
     let text = error.to_string();
     let tail = format!(" at line {} column {}", error.line(), error.column());
     let problem = text.strip_suffix(&tail).unwrap_or(&text).to_string();
-    malformed(path, format!("JSON line {}, column {}", error.line(), error.column()), problem)
+    malformed(
+        path,
+        format!("JSON line {}, column {}", error.line(), error.column()),
+        problem,
+    )
 }
 
 fn read_u32(bytes: &[u8], at: usize) -> Option<u32> {
@@ -72,10 +106,17 @@ fn read_u32(bytes: &[u8], at: usize) -> Option<u32> {
 /// The JSON and BIN chunks. Unknown chunks are skipped, as the format asks; bytes after the end are ignored.
 fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), Error> {
     let (Some(version), Some(length)) = (read_u32(bytes, 4), read_u32(bytes, 8)) else {
-        return Err(malformed(path, "byte 4", format!("the GLB header ends after {} of 12 bytes", bytes.len())));
+        return Err(malformed(
+            path,
+            "byte 4",
+            format!("the GLB header ends after {} of 12 bytes", bytes.len()),
+        ));
     };
     if version != 2 {
-        return Err(Error::Unsupported { path: path.into(), what: format!("GLB version {version}") });
+        return Err(Error::Unsupported {
+            path: path.into(),
+            what: format!("GLB version {version}"),
+        });
     }
     let length = length as usize;
     if length < 12 || length > bytes.len() {
@@ -85,8 +126,15 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
     let (mut json, mut bin) = (None, None);
     let mut at = 12;
     while at < length {
-        let (Some(size), Some(kind)) = (read_u32(&bytes[..length], at), bytes[..length].get(at + 4..at + 8)) else {
-            return Err(malformed(path, format!("byte {at}"), "the file ends inside a chunk header"));
+        let (Some(size), Some(kind)) = (
+            read_u32(&bytes[..length], at),
+            bytes[..length].get(at + 4..at + 8),
+        ) else {
+            return Err(malformed(
+                path,
+                format!("byte {at}"),
+                "the file ends inside a chunk header",
+            ));
         };
         let (start, size) = (at + 8, size as usize);
         let Some(chunk) = bytes[..length].get(start..start.saturating_add(size)) else {
@@ -105,12 +153,15 @@ fn split_glb<'a>(path: &Path, bytes: &'a [u8]) -> Result<(&'a [u8], Option<&'a [
         }
         at = start + size;
     }
-    json.map(|json| (json, bin)).ok_or_else(|| malformed(path, "byte 12", "there is no JSON chunk"))
+    json.map(|json| (json, bin))
+        .ok_or_else(|| malformed(path, "byte 12", "there is no JSON chunk"))
 }
 
 /// Refuses other versions before their unlike structure leads to puzzling messages.
 fn check_version(path: &Path, json: &Value) -> Result<(), Error> {
-    let asset = json.get("asset").ok_or_else(|| malformed(path, "JSON", "there is no \"asset\" object"))?;
+    let asset = json
+        .get("asset")
+        .ok_or_else(|| malformed(path, "JSON", "there is no \"asset\" object"))?;
     let version = asset.get("version").and_then(Value::as_str);
     let Some(version) = version else {
         return Err(malformed(path, "asset", "there is no \"version\" string"));
@@ -118,22 +169,34 @@ fn check_version(path: &Path, json: &Value) -> Result<(), Error> {
     let minimum = asset.get("minVersion").and_then(Value::as_str);
     if !version.starts_with("2.") || minimum.is_some_and(|m| m != "2.0") {
         let what = format!("glTF version {}", minimum.unwrap_or(version));
-        return Err(Error::Unsupported { path: path.into(), what });
+        return Err(Error::Unsupported {
+            path: path.into(),
+            what,
+        });
     }
     Ok(())
 }
 
 fn light_radii(json: &Value) -> Vec<f32> {
-    let lights = json.pointer("/extensions/KHR_lights_punctual/lights").and_then(Value::as_array);
-    let radius = |light: &Value| light.pointer("/extras/radius").and_then(Value::as_f64).unwrap_or(0.0) as f32;
+    let lights = json
+        .pointer("/extensions/KHR_lights_punctual/lights")
+        .and_then(Value::as_array);
+    let radius = |light: &Value| {
+        light
+            .pointer("/extras/radius")
+            .and_then(Value::as_f64)
+            .unwrap_or(0.0) as f32
+    };
     let sound = |radius: f32| if radius.is_finite() { radius.max(0.0) } else { 0.0 };
-    lights.map(|lights| lights.iter().map(radius).map(sound).collect()).unwrap_or_default()
+    lights
+        .map(|lights| lights.iter().map(radius).map(sound).collect())
+        .unwrap_or_default()
 }
 
-/// Removes what `gltf::json` cannot take though the format allows it: extras inside of extensions, scenes
+/// Changes what `gltf::json` cannot take though the format allows it: extras inside of extensions, scenes
 /// without nodes, extended lights, and animation channels without a node (`KHR_animation_pointer`).
 fn fit_to_model(json: &mut Value, notices: &mut Notices) {
-    remove_extras(json);
+    prepare(json);
     if let Some(Value::Array(scenes)) = json.get_mut("scenes") {
         for scene in scenes.iter_mut().filter_map(Value::as_object_mut) {
             scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
@@ -144,39 +207,75 @@ fn fit_to_model(json: &mut Value, notices: &mut Notices) {
             light.remove("extensions");
         }
     }
-    let Some(Value::Array(animations)) = json.get_mut("animations") else { return };
+    let Some(Value::Array(animations)) = json.get_mut("animations") else {
+        return;
+    };
     for (i, animation) in animations.iter_mut().enumerate() {
-        let Some(Value::Array(channels)) = animation.get_mut("channels") else { continue };
+        let Some(Value::Array(channels)) = animation.get_mut("channels") else {
+            continue;
+        };
         channels.retain(|channel| {
-            let on_node = channel.get("target").is_none_or(|target| target.get("node").is_some());
+            let on_node = channel
+                .get("target")
+                .is_none_or(|target| target.get("node").is_some());
             if !on_node {
-                notices.say(format!("animation {i}"), "channels that drive no node are left out");
+                notices.say(
+                    format!("animation {i}"),
+                    "channels that drive no node are left out",
+                );
             }
             on_node
         });
     }
 }
 
-/// Recursion is bounded by the depth limit of the JSON parser (128).
-fn remove_extras(json: &mut Value) {
+/// Removes extras, and makes the largest index (which exists nowhere) of indices above 32 bits: the model would
+/// cut them down to valid ones. Recursion is bounded by the depth limit of the JSON parser (128).
+fn prepare(json: &mut Value) {
     match json {
         Value::Object(map) => {
             map.remove("extras");
-            map.values_mut().for_each(remove_extras);
+            for (key, value) in map {
+                match value {
+                    Value::Number(_) if INDICES.contains(&key.as_str()) => limit_index(value),
+                    Value::Array(list) if INDEX_LISTS.contains(&key.as_str()) => {
+                        list.iter_mut().for_each(limit_index);
+                        list.iter_mut().for_each(prepare);
+                    }
+                    _ => prepare(value),
+                }
+            }
         }
-        Value::Array(values) => values.iter_mut().for_each(remove_extras),
+        Value::Array(values) => values.iter_mut().for_each(prepare),
         _ => {}
+    }
+}
+
+fn limit_index(value: &mut Value) {
+    if value.as_u64().is_some_and(|index| index > u64::from(u32::MAX)) {
+        *value = u32::MAX.into();
     }
 }
 
 fn check_extensions(path: &Path, root: &Root, notices: &mut Notices) -> Result<(), Error> {
     let unknown = |name: &&String| !KNOWN_EXTENSIONS.contains(&name.as_str());
-    let missing: Vec<&str> = root.extensions_required.iter().filter(unknown).map(String::as_str).collect();
+    let missing: Vec<&str> = root
+        .extensions_required
+        .iter()
+        .filter(unknown)
+        .map(String::as_str)
+        .collect();
     if !missing.is_empty() {
-        return Err(Error::Unsupported { path: path.into(), what: missing.join(", ") });
+        return Err(Error::Unsupported {
+            path: path.into(),
+            what: missing.join(", "),
+        });
     }
     for name in root.extensions_used.iter().filter(unknown) {
-        notices.say("extensionsUsed", format!("{name} is not supported and has no effect"));
+        notices.say(
+            "extensionsUsed",
+            format!("{name} is not supported and has no effect"),
+        );
     }
     Ok(())
 }

@@ -42,11 +42,15 @@ pub(super) enum Derivation {
 impl Derivation {
     /// Roughness from an alpha channel that holds glossiness.
     pub(super) fn roughness(glossiness: f32) -> Self {
-        Self::Roughness { glossiness: (glossiness.clamp(0.0, 1.0) * 65535.0).round() as u16 }
+        Self::Roughness {
+            glossiness: (glossiness.clamp(0.0, 1.0) * 65535.0).round() as u16,
+        }
     }
 
     fn apply(self, texels: &mut [[u8; 4]]) {
-        let Self::Roughness { glossiness } = self else { return };
+        let Self::Roughness { glossiness } = self else {
+            return;
+        };
         let factor = f32::from(glossiness) / 65535.0;
         for texel in texels {
             *texel = [0, (255.0 - factor * f32::from(texel[3])).round() as u8, 0, 255];
@@ -93,10 +97,29 @@ impl<'a> Encoded<'a> {
         };
         let from = if from.starts_with("data:") { "" } else { from };
         let named = image.name.as_deref().filter(|name| !name.is_empty());
-        let name = named.map_or_else(|| if from.is_empty() { place.clone() } else { from.into() }, String::from);
-        let place = if from.is_empty() { place } else { format!("{place} ({from})") };
+        let name = named.map_or_else(
+            || {
+                if from.is_empty() {
+                    place.clone()
+                } else {
+                    from.into()
+                }
+            },
+            String::from,
+        );
+        let place = if from.is_empty() {
+            place
+        } else {
+            format!("{place} ({from})")
+        };
         match image::guess_format(&bytes) {
-            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => Ok(Self { wanted, name, place, bytes, format }),
+            Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => Ok(Self {
+                wanted,
+                name,
+                place,
+                bytes,
+                format,
+            }),
             _ => {
                 let start = bytes[..bytes.len().min(8)].escape_ascii();
                 let problem = format!("neither PNG nor JPEG, the content begins with \"{start}\"");
@@ -117,7 +140,10 @@ impl<'a> Encoded<'a> {
     }
 
     fn size(&self, source: &Source<'_>) -> Result<(u32, u32), Error> {
-        let (width, height) = self.reader().into_dimensions().map_err(|e| self.error(source, &e))?;
+        let (width, height) = self
+            .reader()
+            .into_dimensions()
+            .map_err(|e| self.error(source, &e))?;
         if width > MAX_SIDE || height > MAX_SIDE {
             let what = format!("its size of {width}x{height}");
             return Err(source.too_large(&self.place, what, format!("{MAX_SIDE}x{MAX_SIDE}")));
@@ -126,18 +152,29 @@ impl<'a> Encoded<'a> {
     }
 
     fn decode(&self, source: &Source<'_>) -> Result<Image, Error> {
-        let pixels = self.reader().decode().map_err(|e| self.error(source, &e))?.into_rgba8();
+        let pixels = self
+            .reader()
+            .decode()
+            .map_err(|e| self.error(source, &e))?
+            .into_rgba8();
         let (width, height) = pixels.dimensions();
         let mut texels = pixels.as_raw().as_chunks::<4>().0.to_vec();
         self.wanted.derivation.apply(&mut texels);
-        Ok(Image { name: self.name.clone(), width, height, texels })
+        Ok(Image {
+            name: self.name.clone(),
+            width,
+            height,
+            texels,
+        })
     }
 
     fn error(&self, source: &Source<'_>, error: &ImageError) -> Error {
         match error {
-            ImageError::Limits(limit) => {
-                source.too_large(&self.place, format!("its size ({limit})"), format!("{MAX_SIDE}x{MAX_SIDE}"))
-            }
+            ImageError::Limits(limit) => source.too_large(
+                &self.place,
+                format!("its size ({limit})"),
+                format!("{MAX_SIDE}x{MAX_SIDE}"),
+            ),
             _ => source.malformed(&self.place, error.to_string()),
         }
     }

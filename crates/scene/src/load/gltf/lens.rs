@@ -18,7 +18,10 @@ pub(super) fn cameras(source: &Source<'_>, options: &LoadOptions) -> Result<Vec<
         let projection = match source.valid(&camera.type_, "type", &place)? {
             CameraType::Perspective => camera.perspective.as_ref().map(|lens| Projection::Perspective {
                 vfov: f64::from(lens.yfov),
-                aspect: lens.aspect_ratio.map(f64::from).filter(|&aspect| aspect > 0.0 && aspect.is_finite()),
+                aspect: lens
+                    .aspect_ratio
+                    .map(f64::from)
+                    .filter(|&aspect| aspect > 0.0 && aspect.is_finite()),
             }),
             CameraType::Orthographic => camera.orthographic.as_ref().map(|lens| Projection::Orthographic {
                 half_height: f64::from(lens.ymag.abs()) * options.scale,
@@ -27,13 +30,16 @@ pub(super) fn cameras(source: &Source<'_>, options: &LoadOptions) -> Result<Vec<
         };
         let sound = match projection {
             Some(Projection::Perspective { vfov, .. }) => vfov > 0.0 && vfov < std::f64::consts::PI,
-            Some(Projection::Orthographic { half_height, .. }) => half_height > 0.0 && half_height.is_finite(),
+            Some(Projection::Orthographic { half_height, .. }) => {
+                half_height > 0.0 && half_height.is_finite()
+            }
             None => return Err(source.malformed(place, "the object that its type calls for is missing")),
         };
         match projection {
-            Some(projection) if sound => {
-                Ok(Camera { name: camera.name.clone().unwrap_or_default(), projection })
-            }
+            Some(projection) if sound => Ok(Camera {
+                name: camera.name.clone().unwrap_or_default(),
+                projection,
+            }),
             _ => Err(source.malformed(place, "yfov is outside (0, pi) or ymag is 0")),
         }
     };
@@ -68,14 +74,28 @@ pub(super) fn lights(
                     None => std::f32::consts::FRAC_PI_4,
                 };
                 if !(outer > 0.0 && outer <= FRAC_PI_2 && (0.0..outer).contains(&spot.inner_cone_angle)) {
-                    notices.say(&place, "cone angles outside 0 <= inner < outer <= pi/2 are clamped");
+                    notices.say(
+                        &place,
+                        "cone angles outside 0 <= inner < outer <= pi/2 are clamped",
+                    );
                 }
-                let outer = if outer > 0.0 { outer.min(FRAC_PI_2) } else { std::f32::consts::FRAC_PI_4 };
-                LightKind::Spot { inner: spot.inner_cone_angle.max(0.0).min(outer), outer, radius }
+                let outer = if outer > 0.0 {
+                    outer.min(FRAC_PI_2)
+                } else {
+                    std::f32::consts::FRAC_PI_4
+                };
+                LightKind::Spot {
+                    inner: spot.inner_cone_angle.max(0.0).min(outer),
+                    outer,
+                    radius,
+                }
             }
         };
         let color = Vec3::from_array(light.color);
-        if !color.is_finite() || !light.intensity.is_finite() || color.min_element() < 0.0 || light.intensity < 0.0
+        if !color.is_finite()
+            || !light.intensity.is_finite()
+            || color.min_element() < 0.0
+            || light.intensity < 0.0
         {
             return Err(source.malformed(place, "color or intensity is negative or not finite"));
         }
@@ -83,7 +103,10 @@ pub(super) fn lights(
             name: light.name.clone().unwrap_or_default(),
             color,
             intensity: light.intensity,
-            range: light.range.filter(|&range| range > 0.0).map_or(f32::INFINITY, |range| range * scale),
+            range: light
+                .range
+                .filter(|&range| range > 0.0)
+                .map_or(f32::INFINITY, |range| range * scale),
             kind,
         });
     }

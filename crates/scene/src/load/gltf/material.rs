@@ -36,8 +36,16 @@ pub(super) fn read(
     notices: &mut Notices,
 ) -> Result<Materials, Error> {
     let samplers = read_samplers(source)?;
-    let mut textures = Textures { source, notices, images: Vec::new(), index: HashMap::new() };
-    let mut materials = vec![Material { metallic: 1.0, ..Material::default() }];
+    let mut textures = Textures {
+        source,
+        notices,
+        images: Vec::new(),
+        index: HashMap::new(),
+    };
+    let mut materials = vec![Material {
+        metallic: 1.0,
+        ..Material::default()
+    }];
     for (i, material) in source.root.materials.iter().enumerate() {
         let place = place("material", i, material.name.as_ref());
         let mut out = core_material(material, &mut textures, &place)?;
@@ -49,11 +57,19 @@ pub(super) fn read(
         }
         materials.push(out);
     }
-    Ok(Materials { materials, samplers, images: textures.images })
+    Ok(Materials {
+        materials,
+        samplers,
+        images: textures.images,
+    })
 }
 
 /// The properties of the core format.
-fn core_material(material: &json::Material, textures: &mut Textures<'_>, place: &str) -> Result<Material, Error> {
+fn core_material(
+    material: &json::Material,
+    textures: &mut Textures<'_>,
+    place: &str,
+) -> Result<Material, Error> {
     let pbr = &material.pbr_metallic_roughness;
     let cutoff = material.alpha_cutoff.unwrap_or_default().0;
     let mut out = Material {
@@ -79,13 +95,21 @@ fn core_material(material: &json::Material, textures: &mut Textures<'_>, place: 
     };
     if let Some(normal) = &material.normal_texture {
         let transform = textures.transform(normal.extensions.as_ref().map(|e| &e.others), place)?;
-        let texture = Use { index: normal.index, uv_set: normal.tex_coord, transform: transform.as_ref() };
+        let texture = Use {
+            index: normal.index,
+            uv_set: normal.tex_coord,
+            transform: transform.as_ref(),
+        };
         out.normal_texture = textures.texture(texture, Derivation::None, place, "normalTexture")?;
         out.normal_scale = normal.scale;
     }
     if let Some(occlusion) = &material.occlusion_texture {
         let transform = textures.transform(occlusion.extensions.as_ref().map(|e| &e.others), place)?;
-        let texture = Use { index: occlusion.index, uv_set: occlusion.tex_coord, transform: transform.as_ref() };
+        let texture = Use {
+            index: occlusion.index,
+            uv_set: occlusion.tex_coord,
+            transform: transform.as_ref(),
+        };
         out.occlusion_texture = textures.texture(texture, Derivation::None, place, "occlusionTexture")?;
         out.occlusion_strength = occlusion.strength.0.clamp(0.0, 1.0);
     }
@@ -110,9 +134,14 @@ fn extend(
     }
     if let Some(volume) = &extensions.volume {
         out.thickness = volume.thickness_factor.0.max(0.0) * scale;
-        out.thickness_texture = textures.info(volume.thickness_texture.as_ref(), place, "thicknessTexture")?;
+        out.thickness_texture =
+            textures.info(volume.thickness_texture.as_ref(), place, "thicknessTexture")?;
         let distance = volume.attenuation_distance.0;
-        out.attenuation_distance = if distance > 0.0 { distance * scale } else { f32::INFINITY };
+        out.attenuation_distance = if distance > 0.0 {
+            distance * scale
+        } else {
+            f32::INFINITY
+        };
         out.attenuation_color = Vec3::from_array(volume.attenuation_color.0);
     }
     if let Some(specular) = &extensions.specular {
@@ -154,15 +183,25 @@ fn specular_glossiness(
     let texture = glossy.specular_glossiness_texture.as_ref();
     out.specular_color_texture = textures.info(texture, place, name)?;
     if let Some(info) = texture {
-        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        let texture = Use { index: info.index, uv_set: info.tex_coord, transform };
+        let transform = info
+            .extensions
+            .as_ref()
+            .and_then(|e| e.texture_transform.as_ref());
+        let texture = Use {
+            index: info.index,
+            uv_set: info.tex_coord,
+            transform,
+        };
         let derivation = Derivation::roughness(glossiness);
         out.metallic_roughness_texture = textures.texture(texture, derivation, place, name)?;
         if out.metallic_roughness_texture.is_some() {
             out.roughness = 1.0;
         }
     }
-    textures.notices.say(place, "KHR_materials_pbrSpecularGlossiness is converted to metallic-roughness");
+    textures.notices.say(
+        place,
+        "KHR_materials_pbrSpecularGlossiness is converted to metallic-roughness",
+    );
     Ok(())
 }
 
@@ -184,8 +223,15 @@ struct Textures<'a> {
 impl Textures<'_> {
     fn info(&mut self, info: Option<&Info>, place: &str, name: &str) -> Result<Option<TextureRef>, Error> {
         let Some(info) = info else { return Ok(None) };
-        let transform = info.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
-        let texture = Use { index: info.index, uv_set: info.tex_coord, transform };
+        let transform = info
+            .extensions
+            .as_ref()
+            .and_then(|e| e.texture_transform.as_ref());
+        let texture = Use {
+            index: info.index,
+            uv_set: info.tex_coord,
+            transform,
+        };
         self.texture(texture, Derivation::None, place, name)
     }
 
@@ -195,8 +241,13 @@ impl Textures<'_> {
         others: Option<&serde_json::Map<String, json::Value>>,
         place: &str,
     ) -> Result<Option<FileTransform>, Error> {
-        let Some(value) = others.and_then(|others| others.get("KHR_texture_transform")) else { return Ok(None) };
-        let problem = |e: serde_json::Error| self.source.malformed(place, format!("KHR_texture_transform: {e}"));
+        let Some(value) = others.and_then(|others| others.get("KHR_texture_transform")) else {
+            return Ok(None);
+        };
+        let problem = |e: serde_json::Error| {
+            self.source
+                .malformed(place, format!("KHR_texture_transform: {e}"))
+        };
         serde_json::from_value(value.clone()).map(Some).map_err(problem)
     }
 
@@ -212,7 +263,8 @@ impl Textures<'_> {
         let i = source.index(texture.index, source.root.textures.len(), "texture", &place)?;
         let file_texture = &source.root.textures[i];
         if file_texture.source.value() == u32::MAX as usize {
-            self.notices.say(place, "a texture without a PNG or JPEG image is left out");
+            self.notices
+                .say(place, "a texture without a PNG or JPEG image is left out");
             return Ok(None);
         }
         let place = format!("{place}, texture {i}");
@@ -221,9 +273,15 @@ impl Textures<'_> {
             None => 0,
             Some(sampler) => 1 + source.index(sampler, source.root.samplers.len(), "sampler", &place)?,
         };
-        let uv_set = texture.transform.and_then(|transform| transform.tex_coord).unwrap_or(texture.uv_set);
+        let uv_set = texture
+            .transform
+            .and_then(|transform| transform.tex_coord)
+            .unwrap_or(texture.uv_set);
         if uv_set > 1 {
-            self.notices.say(place, "a texture of the third or a later coordinate set is left out");
+            self.notices.say(
+                place,
+                "a texture of the third or a later coordinate set is left out",
+            );
             return Ok(None);
         }
         let wanted = Wanted { image, derivation };
@@ -232,12 +290,19 @@ impl Textures<'_> {
         if index == next {
             self.images.push(wanted);
         }
-        let transform = texture.transform.map_or_else(TextureTransform::default, |t| TextureTransform {
-            offset: Vec2::from_array(t.offset.0),
-            rotation: t.rotation.0,
-            scale: Vec2::from_array(t.scale.0),
-        });
-        Ok(Some(TextureRef { image: index, sampler, uv_set: uv_set as u8, transform }))
+        let transform = texture
+            .transform
+            .map_or_else(TextureTransform::default, |t| TextureTransform {
+                offset: Vec2::from_array(t.offset.0),
+                rotation: t.rotation.0,
+                scale: Vec2::from_array(t.scale.0),
+            });
+        Ok(Some(TextureRef {
+            image: index,
+            sampler,
+            uv_set: uv_set as u8,
+            transform,
+        }))
     }
 }
 
@@ -251,8 +316,16 @@ fn read_samplers(source: &Source<'_>) -> Result<Vec<Sampler>, Error> {
     let mut samplers = vec![Sampler::default()];
     for (i, sampler) in source.root.samplers.iter().enumerate() {
         let place = place("sampler", i, sampler.name.as_ref());
-        let mag = sampler.mag_filter.as_ref().map(|filter| source.valid(filter, "magFilter", &place)).transpose()?;
-        let min = sampler.min_filter.as_ref().map(|filter| source.valid(filter, "minFilter", &place)).transpose()?;
+        let mag = sampler
+            .mag_filter
+            .as_ref()
+            .map(|filter| source.valid(filter, "magFilter", &place))
+            .transpose()?;
+        let min = sampler
+            .min_filter
+            .as_ref()
+            .map(|filter| source.valid(filter, "minFilter", &place))
+            .transpose()?;
         samplers.push(Sampler {
             wrap_u: wrap(source.valid(&sampler.wrap_s, "wrapS", &place)?),
             wrap_v: wrap(source.valid(&sampler.wrap_t, "wrapT", &place)?),

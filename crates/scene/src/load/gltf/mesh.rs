@@ -15,18 +15,56 @@ use super::source::Source;
 use super::{MAX_VERTICES, Notices, place};
 use crate::{Error, Mesh, MorphTarget, Primitive};
 
+/// Unused vertices are dropped where there are more vertices than this for each triangle.
+const VERTICES_PER_TRIANGLE: u64 = 6;
+
 /// Reads all meshes. Primitives without triangles are left out.
 pub(super) fn read(source: &Source<'_>, notices: &mut Notices) -> Result<Vec<Mesh>, Error> {
-    let mut reader = Reader { source, notices, vertices: 0, triangles: 0 };
-    source.root.meshes.iter().enumerate().map(|(i, mesh)| reader.mesh(i, mesh)).collect()
+    check_sizes(source)?;
+    let mut reader = Reader { source, notices };
+    source
+        .root
+        .meshes
+        .iter()
+        .enumerate()
+        .map(|(i, mesh)| reader.mesh(i, mesh))
+        .collect()
+}
+
+/// Primitives may share accessors, so memory is not bounded by the file's size: what all of them would take is
+/// compared with the limits before anything is read.
+fn check_sizes(source: &Source<'_>) -> Result<(), Error> {
+    let count =
+        |index: Option<&Index<Accessor>>| index.and_then(|&index| source.root.get(index)).map(|a| a.count.0);
+    let (mut vertices, mut corners) = (0_u64, 0_u64);
+    for (m, mesh) in source.root.meshes.iter().enumerate() {
+        for (p, primitive) in mesh.primitives.iter().enumerate() {
+            let positions =
+                count(primitive.attributes.get(&Checked::Valid(Semantic::Positions))).unwrap_or(0);
+            let own_corners = count(primitive.indices.as_ref()).unwrap_or(positions);
+            let kept = positions.min(own_corners.saturating_mul(VERTICES_PER_TRIANGLE));
+            let copies = 1 + primitive.targets.as_ref().map_or(0, Vec::len) as u64;
+            vertices = vertices.saturating_add(kept.saturating_mul(copies));
+            corners = corners.saturating_add(own_corners);
+            let limit = MAX_VERTICES as u64;
+            for (count, what, limit) in [
+                (vertices, "vertices", limit),
+                (corners, "triangle corners", 3 * limit),
+            ] {
+                if count > limit {
+                    let place = format!("{}, primitive {p}", place("mesh", m, mesh.name.as_ref()));
+                    let what = format!("the count of {count} {what} up to here");
+                    return Err(source.too_large(place, what, limit.to_string()));
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 struct Reader<'s, 'n> {
     source: &'s Source<'s>,
     notices: &'n mut Notices,
-    /// Vertices so far, morph targets included.
-    vertices: usize,
-    triangles: usize,
 }
 
 impl Reader<'_, '_> {
@@ -38,43 +76,66 @@ impl Reader<'_, '_> {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{place}, primitive {p}");
             if targets(primitive) != target_count {
-                let problem = format!("{} morph targets, primitive 0 has {target_count}", targets(primitive));
+                let problem = format!(
+                    "{} morph targets, primitive 0 has {target_count}",
+                    targets(primitive)
+                );
                 return Err(self.source.malformed(place, problem));
             }
             primitives.extend(self.primitive(primitive, &place)?);
         }
         let mut weights = mesh.weights.clone().unwrap_or_default();
         if !weights.is_empty() && weights.len() != target_count {
-            self.notices.say(&place, "the number of weights is not that of the morph targets; weights are cut or 0");
+            self.notices.say(
+                &place,
+                "the number of weights is not that of the morph targets; weights are cut or 0",
+            );
         }
         weights.resize(target_count, 0.0);
-        Ok(Mesh { name: mesh.name.clone().unwrap_or_default(), primitives, weights })
+        Ok(Mesh {
+            name: mesh.name.clone().unwrap_or_default(),
+            primitives,
+            weights,
+        })
     }
 
-    fn primitive(&mut self, primitive: &json::mesh::Primitive, place: &str) -> Result<Option<Primitive>, Error> {
+    fn primitive(
+        &mut self,
+        primitive: &json::mesh::Primitive,
+        place: &str,
+    ) -> Result<Option<Primitive>, Error> {
         let source = self.source;
         let mode = source.valid(&primitive.mode, "mode", place)?;
-        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+        if matches!(
+            mode,
+            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
+        ) {
             self.notices.say(place, "points and lines are not shown");
             return Ok(None);
         }
         let Some(&positions) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
-            self.notices.say(place, "a primitive without POSITION shows nothing");
+            self.notices
+                .say(place, "a primitive without POSITION shows nothing");
             return Ok(None);
         };
         let positions = source.elements(positions, &[Type::Vec3], place)?;
         let corners = self.corners(primitive, &positions, place)?;
         let mut triangles = self.assemble(mode, &corners, place);
         if triangles.is_empty() {
-            self.notices.say(place, "a primitive without triangles shows nothing");
+            self.notices
+                .say(place, "a primitive without triangles shows nothing");
             return Ok(None);
         }
         let pick = compact(&mut triangles, positions.count);
         let targets = primitive.targets.as_deref().unwrap_or_default();
-        let vertices = pick.as_ref().map_or(positions.count, Vec::len);
-        self.count(vertices.saturating_mul(1 + targets.len()), triangles.len(), place)?;
 
-        let attributes = Attributes { source, primitive, place, count: positions.count, pick: pick.as_deref() };
+        let attributes = Attributes {
+            source,
+            primitive,
+            place,
+            count: positions.count,
+            pick: pick.as_deref(),
+        };
         let colors = attributes.colors()?;
         let (joints, weights) = attributes.joints()?;
         let material = match primitive.material {
@@ -100,19 +161,6 @@ impl Reader<'_, '_> {
         }))
     }
 
-    /// Counts towards the limits.
-    fn count(&mut self, vertices: usize, triangles: usize, place: &str) -> Result<(), Error> {
-        self.vertices = self.vertices.saturating_add(vertices);
-        self.triangles = self.triangles.saturating_add(triangles);
-        for (count, what) in [(self.vertices, "vertices"), (self.triangles, "triangles")] {
-            if count > MAX_VERTICES {
-                let what = format!("the count of {count} {what} up to here");
-                return Err(self.source.too_large(place, what, MAX_VERTICES.to_string()));
-            }
-        }
-        Ok(())
-    }
-
     /// The vertex of every corner, in file order and in range.
     fn corners(
         &self,
@@ -129,10 +177,16 @@ impl Reader<'_, '_> {
             return Err(self.source.malformed(indices.place, problem));
         }
         let corners: Vec<u32> = (0..indices.count).map(|i| indices.integer(i, 0)).collect();
-        match corners.iter().position(|&corner| corner as usize >= positions.count) {
+        match corners
+            .iter()
+            .position(|&corner| corner as usize >= positions.count)
+        {
             None => Ok(corners),
             Some(i) => {
-                let problem = format!("index {i} is {}, there are {} vertices", corners[i], positions.count);
+                let problem = format!(
+                    "index {i} is {}, there are {} vertices",
+                    corners[i], positions.count
+                );
                 Err(self.source.malformed(indices.place, problem))
             }
         }
@@ -145,18 +199,23 @@ impl Reader<'_, '_> {
         let windows = corners.array_windows::<3>().enumerate();
         match mode {
             Mode::TriangleStrip => {
-                let turned = |(i, &[a, b, c]): (usize, &[u32; 3])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
+                let turned =
+                    |(i, &[a, b, c]): (usize, &[u32; 3])| if i % 2 == 0 { [a, b, c] } else { [a, c, b] };
                 windows.map(turned).filter(solid).collect()
             }
             Mode::TriangleFan => {
                 let hub = corners.first().copied().unwrap_or_default();
                 let rim = corners.get(1..).unwrap_or_default();
-                rim.array_windows::<2>().map(|&[a, b]| [a, b, hub]).filter(solid).collect()
+                rim.array_windows::<2>()
+                    .map(|&[a, b]| [a, b, hub])
+                    .filter(solid)
+                    .collect()
             }
             _ => {
                 let (triangles, rest) = corners.as_chunks::<3>();
                 if !rest.is_empty() {
-                    self.notices.say(place, "corners beyond the last whole triangle are left out");
+                    self.notices
+                        .say(place, "corners beyond the last whole triangle are left out");
                 }
                 triangles.to_vec()
             }
@@ -166,7 +225,7 @@ impl Reader<'_, '_> {
 
 /// Renumbers triangles that use few of `count` vertices; the used ones in ascending order, else `None`.
 fn compact(triangles: &mut [[u32; 3]], count: usize) -> Option<Vec<u32>> {
-    if triangles.len() * 6 >= count {
+    if triangles.len() as u64 * VERTICES_PER_TRIANGLE >= count as u64 {
         return None;
     }
     let mut used: Vec<u32> = triangles.iter().flatten().copied().collect();
@@ -194,7 +253,9 @@ impl<'a> Attributes<'a> {
     fn elements(&self, semantic: Semantic, shapes: &[Type]) -> Result<Option<Elements<'a>>, Error> {
         let place = format!("{}, {}", self.place, semantic.to_string());
         let index = self.primitive.attributes.get(&Checked::Valid(semantic));
-        index.map(|&index| self.checked(index, shapes, &place)).transpose()
+        index
+            .map(|&index| self.checked(index, shapes, &place))
+            .transpose()
     }
 
     fn checked(&self, index: Index<Accessor>, shapes: &[Type], place: &str) -> Result<Elements<'a>, Error> {
@@ -213,14 +274,18 @@ impl<'a> Attributes<'a> {
         map: impl Fn([f32; N]) -> T,
     ) -> Result<Vec<T>, Error> {
         let elements = self.elements(semantic, &[shape])?;
-        Ok(elements.map(|elements| elements.gather(self.pick, map)).unwrap_or_default())
+        Ok(elements
+            .map(|elements| elements.gather(self.pick, map))
+            .unwrap_or_default())
     }
 
     fn target(&self, i: usize, target: &json::mesh::MorphTarget) -> Result<MorphTarget, Error> {
         let read = |index: Option<Index<Accessor>>, name: &str| -> Result<Vec<Vec3>, Error> {
             let Some(index) = index else { return Ok(Vec::new()) };
             let place = format!("{}, morph target {i}, {name}", self.place);
-            Ok(self.checked(index, &[Type::Vec3], &place)?.gather(self.pick, Vec3::from_array))
+            Ok(self
+                .checked(index, &[Type::Vec3], &place)?
+                .gather(self.pick, Vec3::from_array))
         };
         Ok(MorphTarget {
             positions: read(target.positions, "POSITION")?,
@@ -236,20 +301,24 @@ impl<'a> Attributes<'a> {
         };
         elements.normalized = true;
         let opaque = elements.components == 3;
-        Ok(elements.gather(self.pick, |[r, g, b, a]| Vec4::new(r, g, b, if opaque { 1.0 } else { a })))
+        Ok(elements.gather(self.pick, |[r, g, b, a]| {
+            Vec4::new(r, g, b, if opaque { 1.0 } else { a })
+        }))
     }
 
-    /// The four strongest joints of each vertex, from any number of sets, with weights that sum to 1.
+    /// The four strongest joints of each vertex, from up to four sets, with weights that sum to 1.
     fn joints(&self) -> Result<(Vec<[u16; 4]>, Vec<Vec4>), Error> {
         let mut sets = Vec::new();
-        for set in 0.. {
+        for set in 0..4 {
             let joints = self.elements(Semantic::Joints(set), &[Type::Vec4])?;
             let weights = self.elements(Semantic::Weights(set), &[Type::Vec4])?;
             let (joints, mut weights) = match (joints, weights) {
                 (Some(joints), Some(weights)) => (joints, weights),
                 (None, None) => break,
                 (Some(one), None) | (None, Some(one)) => {
-                    return Err(self.source.malformed(one.place, "JOINTS and WEIGHTS do not come in pairs"));
+                    return Err(self
+                        .source
+                        .malformed(one.place, "JOINTS and WEIGHTS do not come in pairs"));
                 }
             };
             if !matches!(joints.kind, ComponentType::U8 | ComponentType::U16) {

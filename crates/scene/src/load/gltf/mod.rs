@@ -39,7 +39,10 @@ const MAX_VERTICES: usize = 1 << 27;
 const MAX_NODES: usize = 1 << 22;
 
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
-    let bytes = super::read_file(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    let bytes = super::read_file(path).map_err(|source| Error::Io {
+        path: path.into(),
+        source,
+    })?;
     let mut notices = Notices::default();
     let source = Source::new(path, container::parse(path, &bytes, &mut notices)?)?;
 
@@ -49,13 +52,23 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     if triangles == 0 {
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
         let (nodes, meshes) = (source.root.nodes.len(), source.root.meshes.len());
-        let detail = format!("{}, {}", count(nodes, "node", "nodes"), count(meshes, "mesh", "meshes"));
-        return Err(Error::Empty { path: path.into(), detail });
+        let detail = format!(
+            "{}, {}",
+            count(nodes, "node", "nodes"),
+            count(meshes, "mesh", "meshes")
+        );
+        return Err(Error::Empty {
+            path: path.into(),
+            detail,
+        });
     }
     let materials = material::read(&source, options, &mut notices)?;
     let animations = animation::read(&source, &mut tree, &meshes, &mut notices)?;
     Ok(Scene {
-        name: path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+        name: path
+            .file_stem()
+            .map(|stem| stem.to_string_lossy().into_owned())
+            .unwrap_or_default(),
         cameras: lens::cameras(&source, options)?,
         lights: lens::lights(&source, options, &mut notices)?,
         images: image::decode(&source, &materials.images)?,
@@ -70,7 +83,11 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
 }
 
 fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> Error {
-    Error::Malformed { path: path.into(), place: place.into(), problem: problem.into() }
+    Error::Malformed {
+        path: path.into(),
+        place: place.into(),
+        problem: problem.into(),
+    }
 }
 
 /// How messages call a thing: `mesh 3 "roof"`.
@@ -92,7 +109,13 @@ impl Notices {
         let message = message.into();
         match self.said.iter_mut().find(|(notice, _)| notice.message == message) {
             Some((_, more)) => *more += 1,
-            None => self.said.push((Notice { place: place.into(), message }, 0)),
+            None => self.said.push((
+                Notice {
+                    place: place.into(),
+                    message,
+                },
+                0,
+            )),
         }
     }
 

@@ -36,7 +36,9 @@ pub(super) fn read(
     let roots = scene_roots(source, &parents)?;
     let mut order = Vec::new();
     let mut seen = vec![false; file_nodes.len()];
-    roots.iter().for_each(|&root| walk(source, root, true, &mut seen, &mut order));
+    roots
+        .iter()
+        .for_each(|&root| walk(source, root, true, &mut seen, &mut order));
 
     let mut skins = skin::Used::default();
     for &(i, _) in &order {
@@ -46,13 +48,42 @@ pub(super) fn read(
     }
     for joint in skins.joints(source)? {
         if !seen[joint] {
-            notices.say(node_place(source, joint), "joints outside of the scene are used where they are");
-            let root = std::iter::successors(Some(joint), |&node| parents[node]).last().unwrap_or(joint);
+            notices.say(
+                node_place(source, joint),
+                "joints outside of the scene are used where they are",
+            );
+            let root = std::iter::successors(Some(joint), |&node| parents[node])
+                .last()
+                .unwrap_or(joint);
             walk(source, root, false, &mut seen, &mut order);
         }
     }
 
-    let mut builder = Builder { source, meshes, skins: &skins, notices, nodes: Vec::new(), top: None };
+    let mut count = order.len() + 1;
+    for &(i, _) in &order {
+        count += Instances::of(source, i)?.map_or(0, |instances| instances.count);
+        if count > MAX_NODES {
+            let what = format!("the count of {count} nodes up to here");
+            return Err(source.too_large(node_place(source, i), what, MAX_NODES.to_string()));
+        }
+    }
+    let last_joint = |mesh: &Mesh| {
+        mesh.primitives
+            .iter()
+            .flat_map(|p| p.joints.as_flattened())
+            .copied()
+            .max()
+    };
+    let last_joints = meshes.iter().map(last_joint).collect();
+    let mut builder = Builder {
+        source,
+        meshes,
+        last_joints,
+        skins: &skins,
+        notices,
+        nodes: Vec::new(),
+        top: None,
+    };
     builder.top = builder.push_options(options);
     let mut index = vec![None; file_nodes.len()];
     let mut instanced = vec![false; file_nodes.len()];
@@ -63,7 +94,12 @@ pub(super) fn read(
     }
     let nodes = builder.nodes;
     let skins = skins.read(source, &index)?;
-    Ok(Tree { nodes, skins, index, instanced })
+    Ok(Tree {
+        nodes,
+        skins,
+        index,
+        instanced,
+    })
 }
 
 fn node_place(source: &Source<'_>, i: usize) -> String {
@@ -89,7 +125,10 @@ fn parents(source: &Source<'_>) -> Result<Vec<Option<usize>>, Error> {
     roots.for_each(|root| walk(source, root, true, &mut seen, &mut Vec::new()));
     match seen.iter().position(|seen| !seen) {
         None => Ok(parents),
-        Some(i) => Err(source.malformed(node_place(source, i), "the node is its own ancestor or below such a one")),
+        Some(i) => Err(source.malformed(
+            node_place(source, i),
+            "the node is its own ancestor or below such a one",
+        )),
     }
 }
 
@@ -98,7 +137,9 @@ fn scene_roots(source: &Source<'_>, parents: &[Option<usize>]) -> Result<Vec<usi
     let scenes = &source.root.scenes;
     let scene = match source.root.scene {
         Some(index) => source.index(index, scenes.len(), "scene", "scene")?,
-        None if scenes.is_empty() => return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect()),
+        None if scenes.is_empty() => {
+            return Ok((0..parents.len()).filter(|&i| parents[i].is_none()).collect());
+        }
         None => 0,
     };
     let place = place("scene", scene, scenes[scene].name.as_ref());
@@ -120,7 +161,14 @@ fn walk(source: &Source<'_>, root: usize, shown: bool, seen: &mut [bool], order:
     while let Some(i) = stack.pop() {
         if !std::mem::replace(&mut seen[i], true) {
             order.push((i, shown));
-            stack.extend(source.root.nodes[i].children.iter().flatten().rev().map(json::Index::value));
+            stack.extend(
+                source.root.nodes[i]
+                    .children
+                    .iter()
+                    .flatten()
+                    .rev()
+                    .map(json::Index::value),
+            );
         }
     }
 }
@@ -128,6 +176,8 @@ fn walk(source: &Source<'_>, root: usize, shown: bool, seen: &mut [bool], order:
 struct Builder<'b> {
     source: &'b Source<'b>,
     meshes: &'b [Mesh],
+    /// The largest joint index in each mesh.
+    last_joints: Vec<Option<u16>>,
     skins: &'b skin::Used,
     notices: &'b mut Notices,
     nodes: Vec<Node>,
@@ -145,8 +195,15 @@ impl Builder<'_> {
             UpAxis::Z => DQuat::from_rotation_x(-std::f64::consts::FRAC_PI_2),
         };
         let scale = DVec3::splat(options.scale);
-        let transform = Transform::Trs { translation: DVec3::ZERO, rotation, scale };
-        self.nodes.push(Node { transform, ..Node::default() });
+        let transform = Transform::Trs {
+            translation: DVec3::ZERO,
+            rotation,
+            scale,
+        };
+        self.nodes.push(Node {
+            transform,
+            ..Node::default()
+        });
         Some(0)
     }
 
@@ -164,16 +221,7 @@ impl Builder<'_> {
         if shown {
             self.attach(node, &mut out, &place)?;
         }
-        let instances = match node.extensions.as_ref().and_then(|e| e.others.get("EXT_mesh_gpu_instancing")) {
-            Some(extension) if out.mesh.is_some() => Some(Instances::read(source, extension, &place)?),
-            _ => None,
-        };
-        let count = instances.as_ref().map_or(0, |instances| instances.count);
-        if self.nodes.len() + 1 + count > MAX_NODES {
-            let what = format!("the count of {} nodes up to here", self.nodes.len() + 1 + count);
-            return Err(source.too_large(place, what, MAX_NODES.to_string()));
-        }
-        let Some(instances) = instances else {
+        let Some(instances) = Instances::of(source, i)?.filter(|_| shown) else {
             self.nodes.push(out);
             return Ok(false);
         };
@@ -187,7 +235,14 @@ impl Builder<'_> {
         for k in 0..instances.count {
             let transform = instances.transform(source, k)?;
             let (name, weights) = (name.clone(), weights.clone());
-            self.nodes.push(Node { name, parent, transform, mesh, weights, ..Node::default() });
+            self.nodes.push(Node {
+                name,
+                parent,
+                transform,
+                mesh,
+                weights,
+                ..Node::default()
+            });
         }
         Ok(true)
     }
@@ -198,7 +253,11 @@ impl Builder<'_> {
         if let Some(camera) = node.camera {
             out.camera = Some(source.index(camera, source.root.cameras.len(), "camera", place)?);
         }
-        if let Some(light) = node.extensions.as_ref().and_then(|e| e.khr_lights_punctual.as_ref()) {
+        if let Some(light) = node
+            .extensions
+            .as_ref()
+            .and_then(|e| e.khr_lights_punctual.as_ref())
+        {
             out.light = Some(source.index(light.light, punctual(source).len(), "light", place)?);
         }
         let Some(mesh) = node.mesh else { return Ok(()) };
@@ -207,9 +266,11 @@ impl Builder<'_> {
         if let Some(skin) = node.skin {
             out.skin = self.skins.position(skin.value());
             let joints = source.root.skins[skin.value()].joints.len();
-            let used = self.meshes[mesh].primitives.iter().flat_map(|p| p.joints.as_flattened()).max();
-            if let Some(&joint) = used.filter(|&&joint| usize::from(joint) >= joints) {
-                let problem = format!("mesh {mesh} uses joint {joint}, skin {} has {joints}", skin.value());
+            if let Some(joint) = self.last_joints[mesh].filter(|&joint| usize::from(joint) >= joints) {
+                let problem = format!(
+                    "mesh {mesh} uses joint {joint}, skin {} has {joints}",
+                    skin.value()
+                );
                 return Err(source.malformed(place, problem));
             }
         }
@@ -230,7 +291,9 @@ impl Tree {
     /// Triangles with all instances; an error if they, or their vertices, are too many.
     pub(super) fn count_triangles(&self, source: &Source<'_>, meshes: &[Mesh]) -> Result<usize, Error> {
         let size = |mesh: &Mesh| {
-            mesh.primitives.iter().fold((0, 0), |(t, v), p| (t + p.triangles.len(), v + p.positions.len()))
+            mesh.primitives
+                .iter()
+                .fold((0, 0), |(t, v), p| (t + p.triangles.len(), v + p.positions.len()))
         };
         let sizes: Vec<_> = meshes.iter().map(size).collect();
         let (mut triangles, mut vertices) = (0_usize, 0_usize);
@@ -251,7 +314,11 @@ impl Tree {
 fn transform(source: &Source<'_>, node: &json::Node, place: &str) -> Result<Transform, Error> {
     let transform = match &node.matrix {
         Some(matrix) => Transform::Matrix(DMat4::from_cols_array(&matrix.map(f64::from))),
-        None => trs(node.translation, node.rotation.map(|rotation| rotation.0), node.scale),
+        None => trs(
+            node.translation,
+            node.rotation.map(|rotation| rotation.0),
+            node.scale,
+        ),
     };
     if transform.matrix().is_finite() {
         Ok(transform)
@@ -264,7 +331,11 @@ fn trs(translation: Option<[f32; 3]>, rotation: Option<[f32; 4]>, scale: Option<
     let vector = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
     let unit = |q: [f32; 4]| {
         let q = DQuat::from_array(q.map(f64::from));
-        if q.length_squared() > 0.0 && q.is_finite() { q.normalize() } else { DQuat::IDENTITY }
+        if q.length_squared() > 0.0 && q.is_finite() {
+            q.normalize()
+        } else {
+            DQuat::IDENTITY
+        }
     };
     Transform::Trs {
         translation: translation.map_or(DVec3::ZERO, vector),
@@ -283,25 +354,53 @@ struct Instances<'a> {
 }
 
 impl<'a> Instances<'a> {
+    /// The instances of a node of the file, if it has a mesh and the extension.
+    fn of(source: &'a Source<'_>, i: usize) -> Result<Option<Self>, Error> {
+        let node = &source.root.nodes[i];
+        let extension = node
+            .extensions
+            .as_ref()
+            .and_then(|e| e.others.get("EXT_mesh_gpu_instancing"));
+        match extension.filter(|_| node.mesh.is_some()) {
+            Some(extension) => Self::read(source, extension, &node_place(source, i)).map(Some),
+            None => Ok(None),
+        }
+    }
+
     fn read(source: &'a Source<'_>, extension: &json::Value, place: &str) -> Result<Self, Error> {
         let place = format!("{place}, EXT_mesh_gpu_instancing");
         let attributes = extension.get("attributes");
         let read = |name: &str, shape: Type| -> Result<Option<Elements<'a>>, Error> {
-            let Some(index) = attributes.and_then(|attributes| attributes.get(name)) else { return Ok(None) };
+            let Some(index) = attributes.and_then(|attributes| attributes.get(name)) else {
+                return Ok(None);
+            };
             let place = format!("{place}, {name}");
-            Ok(Some(source.elements(source.accessor_index(index, &place)?, &[shape], &place)?))
+            Ok(Some(source.elements(
+                source.accessor_index(index, &place)?,
+                &[shape],
+                &place,
+            )?))
         };
         let translation = read("TRANSLATION", Type::Vec3)?;
         let rotation = read("ROTATION", Type::Vec4)?;
         let scale = read("SCALE", Type::Vec3)?;
         let present = || [&translation, &rotation, &scale].into_iter().flatten();
         let Some(count) = present().map(|elements| elements.count).next() else {
-            return Err(source.malformed(place, "there is no TRANSLATION, ROTATION or SCALE to count instances by"));
+            return Err(source.malformed(
+                place,
+                "there is no TRANSLATION, ROTATION or SCALE to count instances by",
+            ));
         };
         if present().any(|elements| elements.count != count) {
             return Err(source.malformed(place, "its attributes differ in number"));
         }
-        Ok(Self { place, count, translation, rotation, scale })
+        Ok(Self {
+            place,
+            count,
+            translation,
+            rotation,
+            scale,
+        })
     }
 
     fn transform(&self, source: &Source<'_>, k: usize) -> Result<Transform, Error> {
@@ -313,7 +412,10 @@ impl<'a> Instances<'a> {
         if transform.matrix().is_finite() {
             Ok(transform)
         } else {
-            Err(source.malformed(&self.place, format!("the transform of instance {k} is not finite")))
+            Err(source.malformed(
+                &self.place,
+                format!("the transform of instance {k} is not finite"),
+            ))
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Skins (glTF 2.0 §3.7.3): joints and inverse bind matrices.
 
+use std::collections::HashMap;
+
 use glam::Mat4;
 use gltf::json::accessor::{ComponentType, Type};
 
@@ -11,19 +13,21 @@ use crate::{Error, Skin};
 #[derive(Default)]
 pub(super) struct Used {
     skins: Vec<usize>,
+    position: HashMap<usize, usize>,
 }
 
 impl Used {
     /// Adds a skin of the file.
     pub(super) fn add(&mut self, skin: usize) {
-        if !self.skins.contains(&skin) {
+        let next = self.skins.len();
+        if *self.position.entry(skin).or_insert(next) == next {
             self.skins.push(skin);
         }
     }
 
     /// Index of a file's skin in the scene.
     pub(super) fn position(&self, skin: usize) -> Option<usize> {
-        self.skins.iter().position(|&used| used == skin)
+        self.position.get(&skin).copied()
     }
 
     /// The joints of all used skins, as nodes of the file.
@@ -51,18 +55,29 @@ impl Used {
 fn read(source: &Source<'_>, i: usize, index: &[Option<usize>]) -> Result<Skin, Error> {
     let skin = &source.root.skins[i];
     let place = place("skin", i, skin.name.as_ref());
-    let joints: Vec<usize> = skin.joints.iter().filter_map(|joint| index[joint.value()]).collect();
+    let joints: Vec<usize> = skin
+        .joints
+        .iter()
+        .filter_map(|joint| index[joint.value()])
+        .collect();
     let mut inverse_bind = vec![Mat4::IDENTITY; joints.len()];
     if let Some(accessor) = skin.inverse_bind_matrices {
         let matrices = source.elements(accessor, &[Type::Mat4], &place)?;
         if matrices.kind != ComponentType::F32 || matrices.count < joints.len() {
             let (count, kind) = (matrices.count, matrices.kind);
-            let problem = format!("{count} {kind:?} matrices for {} joints, F32 are needed", joints.len());
+            let problem = format!(
+                "{count} {kind:?} matrices for {} joints, F32 are needed",
+                joints.len()
+            );
             return Err(source.malformed(matrices.place, problem));
         }
         for (k, matrix) in inverse_bind.iter_mut().enumerate() {
             *matrix = Mat4::from_cols_array(&matrices.floats(k));
         }
     }
-    Ok(Skin { name: skin.name.clone().unwrap_or_default(), joints, inverse_bind })
+    Ok(Skin {
+        name: skin.name.clone().unwrap_or_default(),
+        joints,
+        inverse_bind,
+    })
 }

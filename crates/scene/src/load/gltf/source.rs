@@ -6,6 +6,7 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use base64::Engine;
 use gltf::json::validation::Checked;
@@ -14,6 +15,7 @@ use gltf::json::{Index, Root, buffer};
 use super::container::Container;
 use super::{malformed, place};
 use crate::Error;
+use crate::load::{MAX_FILE_BYTES, read_file};
 
 /// The parsed file and its binary data.
 pub(super) struct Source<'a> {
@@ -21,13 +23,25 @@ pub(super) struct Source<'a> {
     pub(super) root: Root,
     pub(super) light_radii: Vec<f32>,
     buffers: Vec<Option<Cow<'a, [u8]>>>,
+    /// Bytes read from URIs so far: a file may name one large file many times.
+    bytes_read: AtomicU64,
 }
 
 impl<'a> Source<'a> {
     /// Loads the buffers of a parsed file.
     pub(super) fn new(path: &'a Path, container: Container<'a>) -> Result<Self, Error> {
-        let Container { root, light_radii, bin } = container;
-        let mut source = Self { path, root, light_radii, buffers: Vec::new() };
+        let Container {
+            root,
+            light_radii,
+            bin,
+        } = container;
+        let mut source = Self {
+            path,
+            root,
+            light_radii,
+            buffers: Vec::new(),
+            bytes_read: AtomicU64::new(0),
+        };
         for i in 0..source.root.buffers.len() {
             let buffer = source.load_buffer(i, bin)?;
             source.buffers.push(buffer);
@@ -64,11 +78,22 @@ impl<'a> Source<'a> {
 
     /// An [`Error::TooLarge`] in this file.
     pub(super) fn too_large(&self, place: impl Into<String>, what: String, limit: String) -> Error {
-        Error::TooLarge { path: self.path.into(), place: place.into(), what, limit }
+        Error::TooLarge {
+            path: self.path.into(),
+            place: place.into(),
+            what,
+            limit,
+        }
     }
 
     /// The index as a number if it is below `len`, the number of things of that `kind`.
-    pub(super) fn index<T>(&self, index: Index<T>, len: usize, kind: &str, place: &str) -> Result<usize, Error> {
+    pub(super) fn index<T>(
+        &self,
+        index: Index<T>,
+        len: usize,
+        kind: &str,
+        place: &str,
+    ) -> Result<usize, Error> {
         let i = index.value();
         if i < len {
             return Ok(i);
@@ -95,7 +120,10 @@ impl<'a> Source<'a> {
         };
         let (start, length) = (view.byte_offset.unwrap_or_default().0, view.byte_length.0);
         span(bytes, start, length).ok_or_else(|| {
-            let problem = format!("bytes {start} + {length} are beyond the {} of buffer {b}", bytes.len());
+            let problem = format!(
+                "bytes {start} + {length} are beyond the {} of buffer {b}",
+                bytes.len()
+            );
             self.malformed(place, problem)
         })
     }
@@ -106,12 +134,18 @@ impl<'a> Source<'a> {
             return decode_data_uri(data).map_err(|problem| self.malformed(place, problem));
         }
         let target = self.resolve(uri, place)?;
-        crate::load::read_file(&target).map_err(|source| Error::Reference {
+        let bytes = read_file(&target).map_err(|source| Error::Reference {
             path: self.path.into(),
             place: place.into(),
             target,
             source,
-        })
+        })?;
+        let total = self.bytes_read.fetch_add(bytes.len() as u64, Ordering::Relaxed) + bytes.len() as u64;
+        if total > MAX_FILE_BYTES {
+            let what = format!("the sum of {total} bytes in referenced files");
+            return Err(self.too_large(place, what, MAX_FILE_BYTES.to_string()));
+        }
+        Ok(bytes)
     }
 
     /// The file that a relative URI means.
@@ -135,7 +169,10 @@ impl<'a> Source<'a> {
             }
         };
         let shown: String = uri.chars().take(80).collect();
-        Err(self.malformed(place, format!("uri {shown:?} {problem}; only data: and relative paths are read")))
+        Err(self.malformed(
+            place,
+            format!("uri {shown:?} {problem}; only data: and relative paths are read"),
+        ))
     }
 }
 
@@ -155,5 +192,7 @@ fn decode_data_uri(data: &str) -> Result<Vec<u8>, String> {
     let config = base64::engine::GeneralPurposeConfig::new()
         .with_decode_padding_mode(base64::engine::DecodePaddingMode::Indifferent);
     let engine = base64::engine::GeneralPurpose::new(&base64::alphabet::STANDARD, config);
-    engine.decode(payload).map_err(|e| format!("the data: URI is not base64: {e}"))
+    engine
+        .decode(payload)
+        .map_err(|e| format!("the data: URI is not base64: {e}"))
 }
