@@ -271,10 +271,7 @@ impl Builder<'_, '_> {
                 // Height and displacement would need derivatives; the others have no counterpart here.
                 "bump" | "map_bump" | "map_Bump" | "disp" | "map_disp" | "decal" | "refl" | "map_Ks"
                 | "map_Ns" | "map_Pr" | "map_Pm" | "map_Tr" | "map_refl" => {
-                    self.notices.push(Notice {
-                        place: place.clone(),
-                        message: format!("{keyword} skipped"),
-                    });
+                    *self.library.skipped.entry(keyword.clone()).or_default() += 1;
                 }
                 _ => {}
             }
