@@ -18,7 +18,7 @@
 //! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, a_i = fl(v_i - o);
 //! for f32 input whose exponents differ by less than 29 that is exact.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 use robust::{Coord3D, orient3d};
 
 use crate::{Light, Receiver, Triangles};
@@ -77,16 +77,35 @@ pub fn attributes(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<Exact
     if normal == DVec3::ZERO {
         return None;
     }
-    let steepness = dir.dot(normal);
-    let t = a0.dot(normal) / steepness;
-    if !t.is_finite() {
-        // The plane is so steep that d . N rounds to zero: the corner's own distance is as good as any.
-        return Some(ExactHit { t: a0.dot(dir) / dir.length_squared(), u: 0.0, v: 0.0 });
-    }
+    let (height, steepness) = (a0.dot(normal), dir.dot(normal));
     let moment = a0.cross(dir);
-    let u = edge2.dot(moment) / steepness;
-    let v = -edge1.dot(moment) / steepness;
-    Some(ExactHit { t, u, v })
+    let hit = ExactHit {
+        t: height / steepness,
+        u: edge2.dot(moment) / steepness,
+        v: -edge1.dot(moment) / steepness,
+    };
+    // Sums of which less than this is left have lost too much for t to be within 2^-23 of its value.
+    let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
+    let doubt = terms * (1.0 / (1u64 << 27) as f64);
+    let sound = height.abs() > doubt.dot(a0.abs()) && steepness.abs() > doubt.dot(dir.abs());
+    Some(if sound { hit } else { confined(hit, dir, corners.map(|c| c.as_dvec3() - origin)) })
+}
+
+/// The hit moved to where the line passes the triangle's box. Hierarchies and grids prune by boxes: a `t` that
+/// cancellation has put outside would be found or not depending on the structure.
+#[cold]
+fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
+    let (low, high) = (a0.min(a1).min(a2), a0.max(a1).max(a2));
+    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
+    for axis in 0..3 {
+        if dir[axis] != 0.0 {
+            let (s, t) = (low[axis] / dir[axis], high[axis] / dir[axis]);
+            enter = enter.max(s.min(t));
+            leave = leave.min(s.max(t));
+        }
+    }
+    let u = hit.u.max(0.0).min(1.0);
+    ExactHit { t: hit.t.max(enter).min(leave), u, v: hit.v.max(0.0).min(1.0 - u) }
 }
 
 /// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its

@@ -26,7 +26,7 @@ mod precise;
 mod ray;
 #[cfg(test)]
 mod test_meshes;
-pub mod topology;
+pub mod space;
 pub mod topology;
 mod triangles;
 pub mod view;
@@ -41,7 +41,6 @@ pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;
 pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
-pub use topology::Topology;
 pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};
