@@ -28,7 +28,10 @@ fn main() {
     let bvh = Bvh::build(BLOB.triangles());
     for (name, rays) in [("eye", eye_rays()), ("random", random_rays())] {
         let mut work = Counters::default();
-        let hits = rays.iter().filter(|ray| bvh.closest(ray, &mut work).is_some()).count();
+        let hits = rays
+            .iter()
+            .filter(|ray| bvh.closest(ray, &mut work).is_some())
+            .count();
         let per_ray = |n: u64| n as f64 / rays.len() as f64;
         println!(
             "{name}: {} rays, {hits} hits, {:.1} nodes and {:.1} triangles a ray",
@@ -43,31 +46,42 @@ fn main() {
 fn eye_rays() -> Vec<Ray> {
     let at = |i: usize| (i as f32 + 0.5) / SIDE as f32 * 2.4 - 1.2;
     let eye = Vec3::new(0.0, 0.0, 4.0);
-    (0..SIDE * SIDE).map(|i| Ray::new(eye, Vec3::new(at(i % SIDE), at(i / SIDE), 0.0) - eye)).collect()
+    (0..SIDE * SIDE)
+        .map(|i| Ray::new(eye, Vec3::new(at(i % SIDE), at(i / SIDE), 0.0) - eye))
+        .collect()
 }
 
 fn random_rays() -> Vec<Ray> {
     let mut random = Random::new(1);
-    (0..SIDE * SIDE).map(|_| Ray::new(random.in_cube(), random.direction())).collect()
+    (0..SIDE * SIDE)
+        .map(|_| Ray::new(random.in_cube(), random.direction()))
+        .collect()
 }
 
 #[divan::bench]
 fn bvh_build(bencher: Bencher) {
     let triangles = BLOB.triangles();
-    bencher.counter(ItemsCount::new(triangles.len())).bench(|| Bvh::build(triangles));
+    bencher
+        .counter(ItemsCount::new(triangles.len()))
+        .bench(|| Bvh::build(triangles));
 }
 
 #[divan::bench]
 fn topology(bencher: Bencher) {
     let triangles = BLOB.triangles();
-    bencher.counter(ItemsCount::new(triangles.len())).bench(|| Topology::analyse(&triangles));
+    bencher
+        .counter(ItemsCount::new(triangles.len()))
+        .bench(|| Topology::analyse(&triangles));
 }
 
 fn closest(bencher: Bencher, rays: &[Ray]) {
     let bvh = Bvh::build(BLOB.triangles());
-    bencher
-        .counter(ItemsCount::new(rays.len()))
-        .bench(|| rays.iter().filter_map(|ray| bvh.intersect(ray)).map(|hit: Hit| hit.t).sum::<f32>());
+    bencher.counter(ItemsCount::new(rays.len())).bench(|| {
+        rays.iter()
+            .filter_map(|ray| bvh.intersect(ray))
+            .map(|hit: Hit| hit.t)
+            .sum::<f32>()
+    });
 }
 
 #[divan::bench]
@@ -85,10 +99,16 @@ fn bvh_shadow(bencher: Bencher) {
     let bvh = Bvh::build(BLOB.triangles());
     let receivers: Vec<Receiver> = eye_rays()
         .iter()
-        .filter_map(|ray| bvh.closest(ray, &mut ()).map(|(prim, hit)| Receiver::on_surface(ray, hit.t, prim)))
+        .filter_map(|ray| {
+            bvh.closest(ray, &mut ())
+                .map(|(prim, hit)| Receiver::on_surface(ray, hit.t, prim))
+        })
         .collect();
     let light = Light::Point(Vec3::new(3.0, 4.0, 2.0));
-    bencher
-        .counter(ItemsCount::new(receivers.len()))
-        .bench(|| receivers.iter().filter(|receiver| bvh.shadowed(receiver, &light)).count());
+    bencher.counter(ItemsCount::new(receivers.len())).bench(|| {
+        receivers
+            .iter()
+            .filter(|receiver| bvh.shadowed(receiver, &light))
+            .count()
+    });
 }

@@ -23,13 +23,18 @@ impl<'a> BruteForce<'a> {
     /// All hits in the ray's range by ascending id, with their triangle ids.
     pub fn hits(&self, ray: &Ray) -> impl Iterator<Item = (u32, ExactHit)> + '_ {
         let ray = *ray;
-        let count = if ray.is_valid() { self.triangles.len() as u32 } else { 0 };
+        let count = if ray.is_valid() {
+            self.triangles.len() as u32
+        } else {
+            0
+        };
         (0..count).filter_map(move |prim| Some((prim, hit_in_range(&self.triangles, prim, &ray)?)))
     }
 
     /// The closest hit in f64, with its triangle id.
     pub fn closest(&self, ray: &Ray) -> Option<(u32, ExactHit)> {
-        self.hits(ray).reduce(|best, next| if next.1.t < best.1.t { next } else { best })
+        self.hits(ray)
+            .reduce(|best, next| if next.1.t < best.1.t { next } else { best })
     }
 }
 
@@ -46,7 +51,12 @@ pub fn hit_in_range(triangles: &Triangles, prim: u32, ray: &Ray) -> Option<Exact
 
 /// Rounds an exact hit to the public form.
 pub(crate) fn rounded(prim: u32, hit: &ExactHit) -> Hit {
-    Hit { t: hit.t as f32, u: hit.u as f32, v: hit.v as f32, prim }
+    Hit {
+        t: hit.t as f32,
+        u: hit.u as f32,
+        v: hit.v as f32,
+        prim,
+    }
 }
 
 /// Sorts exact hits as [`Accel::all_hits`] promises and writes them out rounded.

@@ -104,8 +104,10 @@ fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
             leave = leave.min(s.max(t));
         }
     }
-    let u = hit.u.max(0.0).min(1.0);
-    ExactHit { t: hit.t.max(enter).min(leave), u, v: hit.v.max(0.0).min(1.0 - u) }
+    // All three may be no number; comparisons are written so that it does not survive.
+    let share = |x: f64, most: f64| if x > 0.0 { x.min(most) } else { 0.0 };
+    let u = share(hit.u, 1.0);
+    ExactHit { t: hit.t.max(enter).min(leave), u, v: share(hit.v, 1.0 - u) }
 }
 
 /// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its

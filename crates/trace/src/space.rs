@@ -49,7 +49,15 @@ pub struct SpaceRay {
 impl SpaceRay {
     fn new(start: DVec3, end: DVec3, [t_start, t_end]: [f64; 2], depth: f64, depth_slope: f64) -> Self {
         let start_rate = depth / (t_end - t_start);
-        Self { start, end, t_start, t_end, depth, end_rate: start_rate + depth_slope, start_rate }
+        Self {
+            start,
+            end,
+            t_start,
+            t_end,
+            depth,
+            end_rate: start_rate + depth_slope,
+            start_rate,
+        }
     }
 
     /// The point at `s`.
@@ -224,7 +232,10 @@ impl Perspective {
     /// four, in view coordinates, in the triangle's order of turn.
     pub fn clip_triangle(&self, corners: [DVec3; 3]) -> Polygon {
         let corners = corners.map(|p| self.view(p));
-        let mut polygon = Polygon { points: [DVec3::ZERO; 4], len: 0 };
+        let mut polygon = Polygon {
+            points: [DVec3::ZERO; 4],
+            len: 0,
+        };
         for (i, &a) in corners.iter().enumerate() {
             let b = corners[(i + 1) % 3];
             if a.z >= self.near {
@@ -235,7 +246,11 @@ impl Perspective {
             }
         }
         // A corner that only touches the plane leaves fewer points than a polygon has.
-        if polygon.len < 3 { Polygon { len: 0, ..polygon } } else { polygon }
+        if polygon.len < 3 {
+            Polygon { len: 0, ..polygon }
+        } else {
+            polygon
+        }
     }
 
     /// Where the view segment crosses the near plane; the same for both directions of the segment.
@@ -288,11 +303,18 @@ impl Space for Perspective {
 impl Space for Orthographic {
     fn point(&self, p: DVec3) -> DVec3 {
         let v = self.turned(p - self.center);
-        DVec3::new(v.x / self.half_x, v.y / self.half_y, (v.z - self.near) / (self.far - self.near))
+        DVec3::new(
+            v.x / self.half_x,
+            v.y / self.half_y,
+            (v.z - self.near) / (self.far - self.near),
+        )
     }
 
     fn ray(&self, ray: &Ray) -> Option<SpaceRay> {
-        let (o, d) = (self.turned(ray.origin.as_dvec3() - self.center), self.turned(ray.dir.as_dvec3()));
+        let (o, d) = (
+            self.turned(ray.origin.as_dvec3() - self.center),
+            self.turned(ray.dir.as_dvec3()),
+        );
         let mut range = Range::of(ray)?;
         range.cut(o.z - self.near, d.z);
         range.cut(self.far - o.z, -d.z);
@@ -340,7 +362,14 @@ pub enum Face {
 
 impl Face {
     /// All faces in order.
-    pub const ALL: [Self; 6] = [Self::PosX, Self::NegX, Self::PosY, Self::NegY, Self::PosZ, Self::NegZ];
+    pub const ALL: [Self; 6] = [
+        Self::PosX,
+        Self::NegX,
+        Self::PosY,
+        Self::NegY,
+        Self::PosZ,
+        Self::NegZ,
+    ];
 
     /// The face whose pyramid holds the point `v` relative to the center: that of the component largest in
     /// magnitude, of equal ones the first of x, y, z. The center itself belongs to `PosX`.
@@ -359,7 +388,11 @@ impl Face {
     /// Right, up and forward, see the table.
     pub fn axes(self) -> [DVec3; 3] {
         let axis = self as usize / 2;
-        let sign = if (self as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
+        let sign = if (self as usize).is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        };
         let unit = |axis: usize| DVec3::AXES[axis % 3];
         [unit(axis + 1), unit(axis + 2) * sign, unit(axis) * sign]
     }
@@ -367,7 +400,16 @@ impl Face {
     /// The face's pyramid around `center`, 90 degrees wide.
     pub fn perspective(self, center: DVec3, near: f64, far: f64) -> Perspective {
         let [right, up, forward] = self.axes();
-        Perspective { center, right, up, forward, tan_x: 1.0, tan_y: 1.0, near, far }
+        Perspective {
+            center,
+            right,
+            up,
+            forward,
+            tan_x: 1.0,
+            tan_y: 1.0,
+            near,
+            far,
+        }
     }
 }
 

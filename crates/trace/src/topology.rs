@@ -97,7 +97,12 @@ impl Topology {
             })
             .collect();
         let (order, starts) = grouped(&component_of_triangle, &components);
-        let mut topology = Self { component_of_triangle, components, order, starts };
+        let mut topology = Self {
+            component_of_triangle,
+            components,
+            order,
+            starts,
+        };
         topology.update(triangles);
         topology
     }
@@ -113,8 +118,10 @@ impl Topology {
     /// # Panics
     /// If `triangles` are fewer than those analysed.
     pub fn update(&mut self, triangles: &Triangles) {
-        let measured: Vec<(f64, Vec3, Vec3)> =
-            (0..self.components.len() as u32).into_par_iter().map(|c| self.measure(triangles, c)).collect();
+        let measured: Vec<(f64, Vec3, Vec3)> = (0..self.components.len() as u32)
+            .into_par_iter()
+            .map(|c| self.measure(triangles, c))
+            .collect();
         for (component, (volume, min, max)) in self.components.iter_mut().zip(measured) {
             component.signed_volume = if component.closed { volume } else { 0.0 };
             (component.min, component.max) = (min, max);
@@ -130,17 +137,21 @@ impl Topology {
         let parts: Vec<(f64, Vec3, Vec3)> = list
             .par_chunks(CHUNK)
             .map(|chunk| {
-                chunk.iter().fold((0.0, Vec3::INFINITY, Vec3::NEG_INFINITY), |(volume, min, max), &prim| {
-                    let corners = triangles.corners(prim);
-                    let [a, b, c] = corners.map(|p| p.as_dvec3() - base);
-                    let (low, high) = corners.iter().fold((min, max), |(l, h), &p| (l.min(p), h.max(p)));
-                    (volume + a.dot(b.cross(c)) / 6.0, low, high)
-                })
+                chunk.iter().fold(
+                    (0.0, Vec3::INFINITY, Vec3::NEG_INFINITY),
+                    |(volume, min, max), &prim| {
+                        let corners = triangles.corners(prim);
+                        let [a, b, c] = corners.map(|p| p.as_dvec3() - base);
+                        let (low, high) = corners.iter().fold((min, max), |(l, h), &p| (l.min(p), h.max(p)));
+                        (volume + a.dot(b.cross(c)) / 6.0, low, high)
+                    },
+                )
             })
             .collect();
-        parts.into_iter().fold((0.0, Vec3::INFINITY, Vec3::NEG_INFINITY), |(v, l, h), (volume, low, high)| {
-            (v + volume, l.min(low), h.max(high))
-        })
+        parts.into_iter().fold(
+            (0.0, Vec3::INFINITY, Vec3::NEG_INFINITY),
+            |(v, l, h), (volume, low, high)| (v + volume, l.min(low), h.max(high)),
+        )
     }
 
     /// How often a component winds around a point: 1 inside an outward surface, -1 inside an inward one, 0
@@ -161,7 +172,11 @@ impl Topology {
             if let Some(crossings) = crossings(triangles, list, point, dir) {
                 return crossings;
             }
-            dir = DVec3::new(dir.y - 0.317_7 * dir.z, 1.113_3 * dir.z + 0.1 * dir.x, -0.871_9 * dir.x);
+            dir = DVec3::new(
+                dir.y - 0.317_7 * dir.z,
+                1.113_3 * dir.z + 0.1 * dir.x,
+                -0.871_9 * dir.x,
+            );
         }
         0
     }
@@ -197,7 +212,11 @@ fn crossings(triangles: &Triangles, list: &[u32], point: DVec3, dir: DVec3) -> O
 
 /// c . (a x b) with the exact sign.
 fn volume(a: DVec3, b: DVec3, c: DVec3) -> f64 {
-    let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
+    let coord = |p: DVec3| Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    };
     orient3d(coord(a), coord(b), coord(c), coord(DVec3::ZERO))
 }
 
@@ -213,7 +232,11 @@ fn welded_corners(triangles: &Triangles) -> Vec<[u32; 3]> {
         .map(|t| {
             let finite = t.iter().all(|&i| triangles.vertex(i).is_finite());
             let [a, b, c] = t.map(|i| representative[i as usize]);
-            if finite && a != b && b != c && c != a { [a, b, c] } else { LEFT_OUT }
+            if finite && a != b && b != c && c != a {
+                [a, b, c]
+            } else {
+                LEFT_OUT
+            }
         })
         .collect()
 }
@@ -287,7 +310,10 @@ impl Edges {
                 // One past the vertex: when all are placed, entry v + 1 has become the end of v.
                 let at = &mut starts[a.min(b) as usize + 1];
                 let triangle_and_turn = 2 * i as u32 + u32::from(a > b);
-                halves[*at as usize] = HalfEdge { other: a.max(b), triangle_and_turn };
+                halves[*at as usize] = HalfEdge {
+                    other: a.max(b),
+                    triangle_and_turn,
+                };
                 *at += 1;
             }
         }

@@ -11,8 +11,10 @@ use support::{Random, rays};
 /// A row of the table: a structure's name and how to build it.
 type Structure = (&'static str, for<'a> fn(Triangles<'a>) -> Box<dyn Accel + 'a>);
 
-const STRUCTURES: [Structure; 2] =
-    [("BruteForce", |t| Box::new(BruteForce::new(t))), ("Bvh", |t| Box::new(Bvh::build(t)))];
+const STRUCTURES: [Structure; 2] = [
+    ("BruteForce", |t| Box::new(BruteForce::new(t))),
+    ("Bvh", |t| Box::new(Bvh::build(t))),
+];
 
 fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
@@ -24,12 +26,25 @@ fn same(a: &[Hit], b: &[Hit]) -> bool {
 
 /// Panics with all that is needed to repeat the case if the structure differs from brute force.
 fn check(name: &str, structure: &dyn Accel, mesh: &Mesh, seed: u64, i: usize, ray: &Ray, truth: &[Hit]) {
-    let mut all = vec![Hit { t: 0.0, u: 0.0, v: 0.0, prim: 0 }];
+    let mut all = vec![Hit {
+        t: 0.0,
+        u: 0.0,
+        v: 0.0,
+        prim: 0,
+    }];
     structure.all_hits(ray, &mut all);
     let closest = structure.intersect(ray);
     let place = || format!("{name} on {}, seed {seed}, ray {i}: {ray:?}", mesh.name);
-    assert!(same(&all, truth), "{}\nall hits {all:?}\nshould be {truth:?}", place());
-    assert!(same(closest.as_slice(), &truth[..truth.len().min(1)]), "{}\n{closest:?}\nshould be first of {truth:?}", place());
+    assert!(
+        same(&all, truth),
+        "{}\nall hits {all:?}\nshould be {truth:?}",
+        place()
+    );
+    assert!(
+        same(closest.as_slice(), &truth[..truth.len().min(1)]),
+        "{}\n{closest:?}\nshould be first of {truth:?}",
+        place()
+    );
     assert_eq!(structure.occluded(ray), !truth.is_empty(), "{}", place());
 }
 
@@ -62,8 +77,14 @@ fn all_structures_agree_with_brute_force() {
 fn receivers(mesh: &Mesh, seed: u64, count: usize) -> Vec<Receiver> {
     let brute = BruteForce::new(mesh.triangles());
     let seen = rays::adversarial(mesh, seed, count);
-    let mut receivers: Vec<Receiver> =
-        seen.iter().filter_map(|ray| brute.closest(ray).map(|(prim, hit)| Receiver::on_surface(ray, hit.t, prim))).collect();
+    let mut receivers: Vec<Receiver> = seen
+        .iter()
+        .filter_map(|ray| {
+            brute
+                .closest(ray)
+                .map(|(prim, hit)| Receiver::on_surface(ray, hit.t, prim))
+        })
+        .collect();
     receivers.push(Receiver::free(seen[0].origin.as_dvec3()));
     receivers
 }
@@ -71,8 +92,16 @@ fn receivers(mesh: &Mesh, seed: u64, count: usize) -> Vec<Receiver> {
 /// Lights near and far, inside and outside, at vertices and along axes; some that are no numbers.
 fn lights(mesh: &Mesh, random: &mut Random) -> Vec<Light> {
     let positions = mesh.positions();
-    let some = if positions.is_empty() { Vec3::ONE } else { positions[random.below(positions.len())] };
-    let other = if positions.is_empty() { Vec3::Y } else { positions[random.below(positions.len())] };
+    let some = if positions.is_empty() {
+        Vec3::ONE
+    } else {
+        positions[random.below(positions.len())]
+    };
+    let other = if positions.is_empty() {
+        Vec3::Y
+    } else {
+        positions[random.below(positions.len())]
+    };
     vec![
         Light::Point(some * 3.0 - other),
         Light::Point(some),
@@ -94,7 +123,10 @@ fn all_structures_cast_the_same_shadows() {
         let brute = BruteForce::new(mesh.triangles());
         let receivers = receivers(mesh, seed, 120);
         let lights = lights(mesh, &mut Random::new(seed));
-        let structures = STRUCTURES[1..].iter().map(|(name, build)| (name, build(mesh.triangles()))).collect::<Vec<_>>();
+        let structures = STRUCTURES[1..]
+            .iter()
+            .map(|(name, build)| (name, build(mesh.triangles())))
+            .collect::<Vec<_>>();
         for receiver in &receivers {
             for light in &lights {
                 let truth = brute.shadowed(receiver, light);
@@ -109,8 +141,14 @@ fn all_structures_cast_the_same_shadows() {
 
 #[test]
 fn a_convex_surface_does_not_shadow_itself() {
-    for (k, (scale, offset)) in
-        [(1.0, Vec3::ZERO), (1e-3, Vec3::ONE), (1e3, Vec3::splat(-1e4)), (1e6, Vec3::splat(1e6))].into_iter().enumerate()
+    for (k, (scale, offset)) in [
+        (1.0, Vec3::ZERO),
+        (1e-3, Vec3::ONE),
+        (1e3, Vec3::splat(-1e4)),
+        (1e6, Vec3::splat(1e6)),
+    ]
+    .into_iter()
+    .enumerate()
     {
         let seed = 700 + k as u64;
         let mut random = Random::new(seed);
@@ -118,17 +156,30 @@ fn a_convex_surface_does_not_shadow_itself() {
         let bvh = Bvh::build(mesh.triangles());
         let mut facing = 0;
         for i in 0..20_000 {
-            let ray = rays::at_seam(&mesh, offset + random.direction().normalize() * (scale * 4.0), &mut random);
-            let Some((prim, hit)) = bvh.closest(&ray, &mut ()) else { continue };
+            let ray = rays::at_seam(
+                &mesh,
+                offset + random.direction().normalize() * (scale * 4.0),
+                &mut random,
+            );
+            let Some((prim, hit)) = bvh.closest(&ray, &mut ()) else {
+                continue;
+            };
             let receiver = Receiver::on_surface(&ray, hit.t, prim);
             let away = random.direction().normalize();
-            for light in [Light::Point(offset + away * (scale * 5.0)), Light::Directional(away)] {
+            for light in [
+                Light::Point(offset + away * (scale * 5.0)),
+                Light::Directional(away),
+            ] {
                 let towards = light.towards(receiver.point).normalize();
                 let cosine = towards.dot(mesh.triangles().normal(prim).normalize());
                 // Rounded to the grid of its offset the surface is convex but for that rounding.
                 if cosine > 0.1 {
                     facing += 1;
-                    assert!(!bvh.shadowed(&receiver, &light), "{}, seed {seed}, {i}: {receiver:?} {light:?}", mesh.name);
+                    assert!(
+                        !bvh.shadowed(&receiver, &light),
+                        "{}, seed {seed}, {i}: {receiver:?} {light:?}",
+                        mesh.name
+                    );
                 }
             }
         }
@@ -150,7 +201,11 @@ fn no_ray_escapes(structure: &dyn Accel, mesh: &Mesh, origins: &[Vec3], seed: u6
                 let ray = rays::at_seam(mesh, origin, &mut random);
                 let found = structure.intersect(&ray).is_some();
                 assert!(found, "lost in {}, seed {seed}, ray {i}: {ray:?}", mesh.name);
-                assert!(structure.occluded(&ray), "any differs in {}, seed {seed}, ray {i}: {ray:?}", mesh.name);
+                assert!(
+                    structure.occluded(&ray),
+                    "any differs in {}, seed {seed}, ray {i}: {ray:?}",
+                    mesh.name
+                );
             }
             rays
         })
@@ -178,10 +233,18 @@ fn closed_meshes_are_watertight() {
             let mesh = mesh.placed(scale, offset);
             let seed = (10 * k + j) as u64;
             let mut random = Random::new(seed);
-            let origins: Vec<Vec3> = (0..10).map(|_| offset + random.in_cube() * (scale * 0.4)).collect();
+            let origins: Vec<Vec3> = (0..10)
+                .map(|_| offset + random.in_cube() * (scale * 0.4))
+                .collect();
             let bvh = Bvh::build(mesh.triangles());
             cast += no_ray_escapes(&bvh, &mesh, &origins, seed, 6000);
-            no_ray_escapes(&BruteForce::new(mesh.triangles()), &mesh, &origins[..2], seed, 150);
+            no_ray_escapes(
+                &BruteForce::new(mesh.triangles()),
+                &mesh,
+                &origins[..2],
+                seed,
+                150,
+            );
         }
     }
     assert!(cast >= 1_000_000, "only {cast} rays");
@@ -192,7 +255,10 @@ fn building_does_not_depend_on_the_number_of_threads() {
     let mesh = meshes::blob(6).and(&meshes::soup(77, 20_000, 0.02));
     let rays = rays::adversarial(&mesh, 78, 3000);
     let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
         let bvh = pool.install(|| Bvh::build(mesh.triangles()));
         let mut work = Counters::default();
         let hits: Vec<_> = rays.iter().map(|ray| bvh.closest(ray, &mut work)).collect();
@@ -228,25 +294,48 @@ fn builders_count_what_they_leave_out() {
     let mesh = meshes::broken(1);
     let stats = Bvh::build(mesh.triangles()).stats();
     let finite = |t: &[u32; 3]| t.iter().all(|&i| mesh.triangles().vertex(i).is_finite());
-    assert_eq!(stats.dropped_non_finite, mesh.indices.iter().filter(|t| !finite(t)).count());
+    assert_eq!(
+        stats.dropped_non_finite,
+        mesh.indices.iter().filter(|t| !finite(t)).count()
+    );
     assert!(stats.dropped_non_finite > 10 && stats.dropped_degenerate > 10);
-    assert_eq!(stats.triangles + stats.dropped_non_finite + stats.dropped_degenerate, mesh.indices.len());
-    assert_eq!(Bvh::build(meshes::empty().triangles()).stats(), Default::default());
+    assert_eq!(
+        stats.triangles + stats.dropped_non_finite + stats.dropped_degenerate,
+        mesh.indices.len()
+    );
+    assert_eq!(
+        Bvh::build(meshes::empty().triangles()).stats(),
+        Default::default()
+    );
 }
 
 #[test]
 fn a_receiver_counts_its_error_only_near_itself() {
     let mesh = meshes::single();
     let bvh = Bvh::build(mesh.triangles());
-    let above = |error| Receiver { point: DVec3::new(0.0, 0.0, -1.0), error, prim: u32::MAX };
+    let above = |error| Receiver {
+        point: DVec3::new(0.0, 0.0, -1.0),
+        error,
+        prim: u32::MAX,
+    };
     for light in [Light::Directional(Vec3::Z), Light::Point(Vec3::Z)] {
         assert!(bvh.shadowed(&above(0.5), &light));
         assert!(!bvh.shadowed(&above(1.5), &light));
-        assert!(!bvh.shadowed(&Receiver { prim: 0, ..above(0.0) }, &light));
+        assert!(!bvh.shadowed(
+            &Receiver {
+                prim: 0,
+                ..above(0.0)
+            },
+            &light
+        ));
         assert!(!bvh.shadowed(&above(f64::NAN), &light));
     }
     let brute = BruteForce::new(mesh.triangles());
-    let behind = Receiver { point: DVec3::new(0.0, 0.0, 0.5), error: -1.0, prim: u32::MAX };
+    let behind = Receiver {
+        point: DVec3::new(0.0, 0.0, 0.5),
+        error: -1.0,
+        prim: u32::MAX,
+    };
     for light in [Light::Directional(Vec3::Z), Light::Point(Vec3::Z)] {
         assert_eq!(bvh.shadowed(&behind, &light), brute.shadowed(&behind, &light));
     }

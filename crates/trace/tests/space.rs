@@ -34,7 +34,16 @@ fn perspective(random: &mut Random, far: f64) -> Perspective {
 fn orthographic(random: &mut Random) -> Orthographic {
     let [right, up, forward] = frame(random);
     let center = random.in_cube().as_dvec3();
-    Orthographic { center, right, up, forward, half_x: 3.0, half_y: 2.0, near: -1.0, far: 4.0 }
+    Orthographic {
+        center,
+        right,
+        up,
+        forward,
+        half_x: 3.0,
+        half_y: 2.0,
+        near: -1.0,
+        far: 4.0,
+    }
 }
 
 fn ray(random: &mut Random, t_max: f32) -> Ray {
@@ -48,7 +57,11 @@ fn points_go_there_and_back() {
     let mut random = Random::new(1);
     for k in 0..2000 {
         let space = perspective(&mut random, if k % 2 == 0 { 100.0 } else { f64::INFINITY });
-        let q = DVec3::new(random.signed().into(), random.signed().into(), random.unit().into());
+        let q = DVec3::new(
+            random.signed().into(),
+            random.signed().into(),
+            random.unit().into(),
+        );
         let p = space.world(q);
         assert!((space.point(p) - q).length() < 1e-11, "{q} {}", space.point(p));
         let space = orthographic(&mut random);
@@ -68,16 +81,28 @@ fn depth_runs_from_zero_to_one() {
 /// A ray's points map to the space ray's points, `t` and `s` convert into each other, and the segment lies within
 /// the limits.
 fn check_ray(space: &impl Space, ray: &Ray, seed: usize) -> bool {
-    let Some(mapped) = space.ray(ray) else { return false };
+    let Some(mapped) = space.ray(ray) else {
+        return false;
+    };
     let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
     let reaches = if mapped.t_end.is_finite() { 20 } else { 19 };
     for i in 0..=reaches {
         let s = f64::from(i) / 20.0;
         let t = mapped.t_of_s(s);
-        assert!((mapped.s_of_t(t) - s).abs() < 1e-12, "case {seed}: s {s} t {t} back {}", mapped.s_of_t(t));
-        assert!(t >= mapped.t_start - 1e-12 && t <= mapped.t_end + 1e-10, "case {seed}: t {t} of {mapped:?}");
+        assert!(
+            (mapped.s_of_t(t) - s).abs() < 1e-12,
+            "case {seed}: s {s} t {t} back {}",
+            mapped.s_of_t(t)
+        );
+        assert!(
+            t >= mapped.t_start - 1e-12 && t <= mapped.t_end + 1e-10,
+            "case {seed}: t {t} of {mapped:?}"
+        );
         let (from_world, on_line) = (space.point(o + d * t), mapped.at(s));
-        assert!((from_world - on_line).length() < 1e-9, "case {seed}: {from_world} {on_line}");
+        assert!(
+            (from_world - on_line).length() < 1e-9,
+            "case {seed}: {from_world} {on_line}"
+        );
     }
     true
 }
@@ -93,11 +118,16 @@ fn a_line_stays_a_line_and_parameters_convert() {
         let space = perspective(&mut random, far);
         mapped[k % 2] += usize::from(check_ray(&space, &ray, k));
         if let Some(r) = space.ray(&ray) {
-            let inside = |q: DVec3| q.x.abs() < 1.0 + 1e-9 && q.y.abs() < 1.0 + 1e-9 && q.z > -1e-9 && q.z < 1.0 + 1e-9;
+            let inside = |q: DVec3| {
+                q.x.abs() < 1.0 + 1e-9 && q.y.abs() < 1.0 + 1e-9 && q.z > -1e-9 && q.z < 1.0 + 1e-9
+            };
             assert!(inside(r.start) && inside(r.end), "case {k}: {r:?}");
         }
         mapped[2] += usize::from(check_ray(&orthographic(&mut random), &ray, k));
-        let world = World { min: DVec3::splat(-4.0), max: DVec3::splat(6.0) };
+        let world = World {
+            min: DVec3::splat(-4.0),
+            max: DVec3::splat(6.0),
+        };
         mapped[3] += usize::from(check_ray(&world, &ray, k));
     }
     assert!(mapped.iter().all(|&n| n > 400), "{mapped:?}");
@@ -110,7 +140,10 @@ fn rays_through_the_center_are_parallel_to_depth() {
         let space = perspective(&mut random, f64::INFINITY);
         let q = DVec3::new(random.signed().into(), random.signed().into(), 0.5) * 0.9;
         let d = (space.world(q) - space.center).normalize();
-        let (near, far) = (space.point(space.center + d * 1.0), space.point(space.center + d * 90.0));
+        let (near, far) = (
+            space.point(space.center + d * 1.0),
+            space.point(space.center + d * 90.0),
+        );
         assert!((near - far).truncate().length() < 1e-12);
     }
 }
@@ -122,7 +155,9 @@ fn nothing_behind_the_near_plane_is_mapped() {
     assert_eq!(space.ray(&behind), None);
     let along = Ray::new(Vec3::new(-9.0, 0.0, 0.999), Vec3::X);
     assert_eq!(space.ray(&along), None);
-    let crossing = space.ray(&Ray::new(Vec3::new(0.0, 0.0, -3.0), Vec3::new(0.1, 0.0, 1.0))).expect("it comes out");
+    let crossing = space
+        .ray(&Ray::new(Vec3::new(0.0, 0.0, -3.0), Vec3::new(0.1, 0.0, 1.0)))
+        .expect("it comes out");
     assert_eq!((crossing.t_start, crossing.t_end), (4.0, f64::INFINITY));
     assert!(space.ray(&Ray::new(Vec3::NAN, Vec3::X)).is_none());
 }
@@ -137,25 +172,42 @@ fn clipping_keeps_what_lies_beyond_the_near_plane() {
         let polygon = space.clip_triangle(corners);
         let points = polygon.points();
         seen[points.len()] += 1;
-        assert!(points.iter().all(|p| p.z >= space.near), "case {case}: {polygon:?}");
+        assert!(
+            points.iter().all(|p| p.z >= space.near),
+            "case {case}: {polygon:?}"
+        );
         // Areas of the two sides of the plane add up: clip by the plane from the other side too.
         let view = corners.map(|p| space.view(p));
         let normal = (view[1] - view[0]).cross(view[2] - view[0]);
-        let area = |p: &[DVec3]| (1..p.len().max(2) - 1).map(|i| (p[i] - p[0]).cross(p[i + 1] - p[0]).dot(normal)).sum::<f64>();
+        let area = |p: &[DVec3]| {
+            (1..p.len().max(2) - 1)
+                .map(|i| (p[i] - p[0]).cross(p[i + 1] - p[0]).dot(normal))
+                .sum::<f64>()
+        };
         let flipped = Perspective {
             center: space.center + space.forward * (2.0 * space.near),
             forward: -space.forward,
             ..space
         };
         let other = flipped.clip_triangle([corners[0], corners[2], corners[1]]);
-        let rest: Vec<DVec3> = other.points().iter().map(|p| DVec3::new(p.x, p.y, -p.z)).collect();
+        let rest: Vec<DVec3> = other
+            .points()
+            .iter()
+            .map(|p| DVec3::new(p.x, p.y, -p.z))
+            .collect();
         let whole = area(&view);
-        assert!(((area(points) - area(&rest)) / whole - 1.0).abs() < 1e-9, "case {case}");
+        assert!(
+            ((area(points) - area(&rest)) / whole - 1.0).abs() < 1e-9,
+            "case {case}"
+        );
         // A cut edge is the same from both of its triangles.
         let there = space.clip_segment(corners[0], corners[1]);
         let back = space.clip_segment(corners[1], corners[0]).map(|[a, b]| [b, a]);
         assert_eq!(there, back, "case {case}");
-        assert_eq!(there.is_some(), view[0].z >= space.near || view[1].z >= space.near);
+        assert_eq!(
+            there.is_some(),
+            view[0].z >= space.near || view[1].z >= space.near
+        );
     }
     assert!(seen[0] > 100 && seen[3] > 100 && seen[4] > 100, "{seen:?}");
 }
@@ -201,20 +253,32 @@ fn six_faces_cover_a_ray_but_for_the_near_cube() {
         assert!(intervals.is_sorted_by(|(_, a), (_, b)| a[0] <= b[0]));
         let at = |t: f64| ray.origin.as_dvec3() + ray.dir.as_dvec3() * t - center;
         let mut last = f64::from(ray.t_min);
-        for (face, [t_in, t_out]) in intervals.into_iter().chain([(Face::PosX, [f64::from(ray.t_max); 2])]) {
+        for (face, [t_in, t_out]) in intervals
+            .into_iter()
+            .chain([(Face::PosX, [f64::from(ray.t_max); 2])])
+        {
             if t_in > last {
                 // A gap: all of it lies in the near cube.
                 through_cube += 1;
                 for i in 0..=8 {
                     let distance = at(last + (t_in - last) * f64::from(i) / 8.0).abs().max_element();
-                    assert!(distance <= near * (1.0 + 1e-9), "case {case}: gap at distance {distance}");
+                    assert!(
+                        distance <= near * (1.0 + 1e-9),
+                        "case {case}: gap at distance {distance}"
+                    );
                 }
             }
             if t_out > t_in {
                 let middle = at((t_in + t_out) * 0.5);
                 let largest = middle.abs().max_element();
-                assert!(face.axes()[2].dot(middle) >= largest * (1.0 - 1e-9), "case {case}: {face:?} at {middle}");
-                assert!(largest >= near * (1.0 - 1e-9), "case {case}: inside the near cube");
+                assert!(
+                    face.axes()[2].dot(middle) >= largest * (1.0 - 1e-9),
+                    "case {case}: {face:?} at {middle}"
+                );
+                assert!(
+                    largest >= near * (1.0 - 1e-9),
+                    "case {case}: inside the near cube"
+                );
             }
             last = last.max(t_out);
         }

@@ -10,8 +10,14 @@ use support::meshes::{self, Mesh};
 
 /// The same triangles, each with corners of its own.
 fn unshared(mesh: &Mesh) -> Mesh {
-    let positions: Vec<Vec3> = mesh.indices.iter().flat_map(|&t| t.map(|i| mesh.triangles().vertex(i))).collect();
-    let indices = (0..mesh.indices.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let positions: Vec<Vec3> = mesh
+        .indices
+        .iter()
+        .flat_map(|&t| t.map(|i| mesh.triangles().vertex(i)))
+        .collect();
+    let indices = (0..mesh.indices.len() as u32)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
     Mesh::new(&mesh.name, &positions, indices)
 }
 
@@ -26,14 +32,24 @@ fn turned(mesh: &Mesh) -> Mesh {
 #[test]
 fn a_sphere_is_closed_with_its_volume() {
     let sphere = meshes::icosphere(4);
-    for mesh in [sphere.clone(), unshared(&sphere), sphere.placed(1.0, Vec3::new(1e3, -1e3, 5e2))] {
+    for mesh in [
+        sphere.clone(),
+        unshared(&sphere),
+        sphere.placed(1.0, Vec3::new(1e3, -1e3, 5e2)),
+    ] {
         let topology = Topology::analyse(&mesh.triangles());
-        let [component] = topology.components[..] else { panic!("{:?}", topology.components) };
+        let [component] = topology.components[..] else {
+            panic!("{:?}", topology.components)
+        };
         assert_eq!(component.triangles, mesh.indices.len());
         assert!(component.closed);
         assert_eq!(component.orientation(), Some(Orientation::Outward));
         let exact = 4.0 / 3.0 * std::f64::consts::PI;
-        assert!((component.signed_volume / exact - 1.0).abs() < 0.01, "{}", component.signed_volume);
+        assert!(
+            (component.signed_volume / exact - 1.0).abs() < 0.01,
+            "{}",
+            component.signed_volume
+        );
     }
     let topology = Topology::analyse(&turned(&sphere).triangles());
     assert_eq!(topology.components[0].orientation(), Some(Orientation::Inward));
@@ -67,14 +83,20 @@ fn holes_wrong_turns_and_third_faces_open_only_their_component() {
         let both = bad.placed(1.0, Vec3::X * 5.0).and(&sphere);
         let topology = Topology::analyse(&both.triangles());
         assert_eq!(topology.components.len(), 2);
-        assert_eq!(topology.components.iter().map(|c| c.closed).collect::<Vec<_>>(), [false, true]);
+        assert_eq!(
+            topology.components.iter().map(|c| c.closed).collect::<Vec<_>>(),
+            [false, true]
+        );
         assert_eq!(topology.components[0].orientation(), None);
         assert_eq!(topology.component_of_triangle[0], 0);
         assert_eq!(topology.component_of_triangle[both.indices.len() - 1], 1);
         let listed = topology.triangles_of(1);
         assert_eq!(listed.first().copied(), Some(bad.indices.len() as u32));
         assert_eq!(listed.len(), sphere.indices.len());
-        assert_eq!(topology.components[0].min, both.positions()[..162].iter().copied().fold(Vec3::MAX, Vec3::min));
+        assert_eq!(
+            topology.components[0].min,
+            both.positions()[..162].iter().copied().fold(Vec3::MAX, Vec3::min)
+        );
     }
 }
 
@@ -109,15 +131,28 @@ fn winding_numbers_tell_inside_from_outside() {
             let share = f64::from(random.unit()) * 1.9;
             let expected = if share < 1.0 { sign } else { 0 };
             if (share - 1.0).abs() > 1e-6 {
-                assert_eq!(topology.winding_number(&mesh.triangles(), 0, vertex * share), expected, "{vertex} {share}");
+                assert_eq!(
+                    topology.winding_number(&mesh.triangles(), 0, vertex * share),
+                    expected,
+                    "{vertex} {share}"
+                );
             }
         }
-        assert_eq!(topology.winding_number(&mesh.triangles(), 0, DVec3::splat(10.0)), 0);
+        assert_eq!(
+            topology.winding_number(&mesh.triangles(), 0, DVec3::splat(10.0)),
+            0
+        );
     }
     let both = outer.and(&inner);
     let topology = Topology::analyse(&both.triangles());
-    assert_eq!(topology.winding_number(&both.triangles(), 1, DVec3::splat(0.1)), 1);
-    assert_eq!(topology.winding_number(&both.triangles(), 1, DVec3::splat(0.2)), 0);
+    assert_eq!(
+        topology.winding_number(&both.triangles(), 1, DVec3::splat(0.1)),
+        1
+    );
+    assert_eq!(
+        topology.winding_number(&both.triangles(), 1, DVec3::splat(0.2)),
+        0
+    );
 }
 
 #[test]
@@ -133,7 +168,10 @@ fn update_follows_moved_vertices() {
 fn the_result_does_not_depend_on_the_number_of_threads() {
     let mesh = meshes::blob(6).and(&meshes::soup(5, 5000, 0.1));
     let with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
         pool.install(|| Topology::analyse(&mesh.triangles()))
     };
     assert_eq!(with(1), with(2));

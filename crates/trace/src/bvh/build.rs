@@ -47,25 +47,45 @@ pub(super) struct Built {
 /// Builds over all triangles that are finite and have area.
 pub(super) fn build(triangles: &Triangles) -> Built {
     let (prims, stats) = usable(triangles);
-    let boxes: Vec<Bounds> = prims.par_iter().map(|&p| Bounds::of(&triangles.corners(p))).collect();
+    let boxes: Vec<Bounds> = prims
+        .par_iter()
+        .map(|&p| Bounds::of(&triangles.corners(p)))
+        .collect();
     let Some(scene) = boxes.par_iter().copied().reduce_with(|a, b| a.union(&b)) else {
-        return Built { nodes: Vec::new(), leaves: Vec::new(), stack: 0, reach: 0.0, stats };
+        return Built {
+            nodes: Vec::new(),
+            leaves: Vec::new(),
+            stack: 0,
+            reach: 0.0,
+            stats,
+        };
     };
     let tree = cluster(&boxes, &scene);
     let order = &tree.primitive_indices;
     let leaves = order
         .par_iter()
-        .map(|&i| Leaf { corners: triangles.corners(prims[i as usize]), prim: prims[i as usize] })
+        .map(|&i| Leaf {
+            corners: triangles.corners(prims[i as usize]),
+            prim: prims[i as usize],
+        })
         .collect();
     let (nodes, stack) = widen(&tree, &true_bounds(&tree, &boxes));
     let reach = f64::from(scene.min.abs().max(scene.max.abs()).max_element());
-    Built { nodes, leaves, stack, reach, stats }
+    Built {
+        nodes,
+        leaves,
+        stack,
+        reach,
+        stats,
+    }
 }
 
 /// Ids of the triangles that take part.
 fn usable(triangles: &Triangles) -> (Vec<u32>, BuildStats) {
-    let prims: Vec<u32> =
-        (0..triangles.len() as u32).into_par_iter().filter(|&p| !triangles.is_degenerate(p)).collect();
+    let prims: Vec<u32> = (0..triangles.len() as u32)
+        .into_par_iter()
+        .filter(|&p| !triangles.is_degenerate(p))
+        .collect();
     let non_finite = (0..triangles.len() as u32)
         .into_par_iter()
         .filter(|&p| !triangles.corners(p).iter().all(|c| c.is_finite()))
@@ -128,14 +148,19 @@ fn preorder(tree: &Bvh2) -> Vec<u32> {
 
 /// Boxes of the binary tree's nodes around the real triangles.
 fn true_bounds(tree: &Bvh2, boxes: &[Bounds]) -> Vec<Bounds> {
-    let nothing = Bounds { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+    let nothing = Bounds {
+        min: Vec3A::INFINITY,
+        max: Vec3A::NEG_INFINITY,
+    };
     let mut bounds = vec![nothing; tree.nodes.len()];
     for i in preorder(tree).into_iter().rev() {
         let node = &tree.nodes[i as usize];
         let first = node.first_index as usize;
         bounds[i as usize] = if node.is_leaf() {
             let prims = &tree.primitive_indices[first..first + node.prim_count as usize];
-            prims.iter().fold(nothing, |all, &p| all.union(&boxes[p as usize]))
+            prims
+                .iter()
+                .fold(nothing, |all, &p| all.union(&boxes[p as usize]))
         } else {
             bounds[first].union(&bounds[first + 1])
         };

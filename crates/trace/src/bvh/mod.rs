@@ -44,8 +44,21 @@ const INLINE_STACK: usize = 64;
 impl<'a> Bvh<'a> {
     /// Builds over all triangles that are finite and have area, in parallel; the same for any number of threads.
     pub fn build(triangles: Triangles<'a>) -> Self {
-        let Built { nodes, leaves, stack, reach, stats } = build::build(&triangles);
-        Self { triangles, nodes, leaves, stack, reach, stats }
+        let Built {
+            nodes,
+            leaves,
+            stack,
+            reach,
+            stats,
+        } = build::build(&triangles);
+        Self {
+            triangles,
+            nodes,
+            leaves,
+            stack,
+            reach,
+            stats,
+        }
     }
 
     /// What was built and what was left out.
@@ -81,12 +94,19 @@ impl<'a> Bvh<'a> {
 
     /// [`Accel::occluded`], counting the work.
     pub fn any(&self, ray: &Ray, count: &mut impl Count) -> bool {
-        let Some(mut slab) = self.slab(ray) else { return false };
+        let Some(mut slab) = self.slab(ray) else {
+            return false;
+        };
         let filter = Filter::new(ray.origin.as_dvec3(), ray.dir.as_dvec3());
         let mut found = false;
         self.walk(&mut slab, count, |leaf, _| {
-            found = !filter.certain_miss(&leaf.corners) && hit_in_range(&self.triangles, leaf.prim, ray).is_some();
-            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            found = !filter.certain_miss(&leaf.corners)
+                && hit_in_range(&self.triangles, leaf.prim, ray).is_some();
+            if found {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         });
         found
     }
@@ -103,13 +123,19 @@ impl<'a> Bvh<'a> {
             }
             Light::Directional(direction) => (receiver.point, direction.as_dvec3(), -beyond, f64::INFINITY),
         };
-        let Some(mut slab) = Slab::new(origin, dir, t_min, t_max, self.reach) else { return false };
+        let Some(mut slab) = Slab::new(origin, dir, t_min, t_max, self.reach) else {
+            return false;
+        };
         let filter = Filter::new(origin, dir);
         let mut found = false;
         self.walk(&mut slab, count, |leaf, _| {
             found = !filter.certain_miss(&leaf.corners)
                 && exact::shadows(&self.triangles, leaf.prim, receiver, light);
-            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            if found {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         });
         found
     }
@@ -119,7 +145,13 @@ impl<'a> Bvh<'a> {
             return None;
         }
         let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
-        Slab::new(ray.origin.as_dvec3(), ray.dir.as_dvec3(), t_min, t_max, self.reach)
+        Slab::new(
+            ray.origin.as_dvec3(),
+            ray.dir.as_dvec3(),
+            t_min,
+            t_max,
+            self.reach,
+        )
     }
 
     /// Calls `visit` with every triangle whose leaf the ray may enter, nearer leaves first as far as boxes tell.
@@ -148,7 +180,11 @@ impl<'a> Bvh<'a> {
         if self.nodes.is_empty() {
             return;
         }
-        stack[0] = Entry { near: f32::NEG_INFINITY, first: 0, count: INNER };
+        stack[0] = Entry {
+            near: f32::NEG_INFINITY,
+            first: 0,
+            count: INNER,
+        };
         let mut held = 1;
         while held > 0 {
             held -= 1;
@@ -173,7 +209,11 @@ impl<'a> Bvh<'a> {
             for lane in 0..WIDTH {
                 if hit[lane] {
                     // Insertion sort: the nearest child ends up on top.
-                    let child = Entry { near: near[lane], first: node.first[lane], count: node.count[lane] };
+                    let child = Entry {
+                        near: near[lane],
+                        first: node.first[lane],
+                        count: node.count[lane],
+                    };
                     let mut at = held;
                     while at > bottom && stack[at - 1].near < child.near {
                         stack[at] = stack[at - 1];
@@ -233,7 +273,11 @@ struct Filter {
 
 impl Filter {
     fn new(origin: DVec3, dir: DVec3) -> Self {
-        Self { origin, dir, bound: dir.abs().max_element() * f64::from_bits((1023 - 44) << 52) }
+        Self {
+            origin,
+            dir,
+            bound: dir.abs().max_element() * f64::from_bits((1023 - 44) << 52),
+        }
     }
 
     #[inline(always)]

@@ -47,12 +47,18 @@ impl Bounds {
     /// The box of three corners.
     pub(super) fn of(corners: &[glam::Vec3; 3]) -> Self {
         let [a, b, c] = corners.map(glam::Vec3A::from);
-        Self { min: a.min(b).min(c), max: a.max(b).max(c) }
+        Self {
+            min: a.min(b).min(c),
+            max: a.max(b).max(c),
+        }
     }
 
     /// The box around both.
     pub(super) fn union(&self, other: &Self) -> Self {
-        Self { min: self.min.min(other.min), max: self.max.max(other.max) }
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
     }
 
     /// Half the surface, in f64 since the extents of f32 coordinates may overflow f32.

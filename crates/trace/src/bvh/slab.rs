@@ -62,7 +62,13 @@ impl Slab {
         }
         let pad = size * ORIGIN_PAD + TINY;
         let dir = (dir / scale).to_array();
-        let component = dir.map(|d| if d.abs() < SMALLEST_COMPONENT { SMALLEST_COMPONENT.copysign(d) } else { d });
+        let component = dir.map(|d| {
+            if d.abs() < SMALLEST_COMPONENT {
+                SMALLEST_COMPONENT.copysign(d)
+            } else {
+                d
+            }
+        });
         Some(Self {
             origin: [
                 origin.to_array().map(|o| ((o + pad) as f32).next_up()),

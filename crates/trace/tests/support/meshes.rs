@@ -32,7 +32,9 @@ impl Mesh {
     }
 
     pub fn positions(&self) -> Vec<Vec3> {
-        (0..self.x.len()).map(|i| Vec3::new(self.x[i], self.y[i], self.z[i])).collect()
+        (0..self.x.len())
+            .map(|i| Vec3::new(self.x[i], self.y[i], self.z[i]))
+            .collect()
     }
 
     pub fn map(&self, name: &str, f: impl Fn(Vec3) -> Vec3) -> Self {
@@ -52,7 +54,8 @@ impl Mesh {
         self.x.extend(&other.x);
         self.y.extend(&other.y);
         self.z.extend(&other.z);
-        self.indices.extend(other.indices.iter().map(|t| t.map(|i| i + base)));
+        self.indices
+            .extend(other.indices.iter().map(|t| t.map(|i| i + base)));
         self
     }
 }
@@ -73,15 +76,42 @@ pub fn soup(seed: u64, count: usize, size: f32) -> Mesh {
 pub fn icosphere(level: u32) -> Mesh {
     let g = (1.0 + 5f32.sqrt()) / 2.0;
     let mut positions: Vec<Vec3> = [
-        (-1., g, 0.), (1., g, 0.), (-1., -g, 0.), (1., -g, 0.), (0., -1., g), (0., 1., g),
-        (0., -1., -g), (0., 1., -g), (g, 0., -1.), (g, 0., 1.), (-g, 0., -1.), (-g, 0., 1.),
+        (-1., g, 0.),
+        (1., g, 0.),
+        (-1., -g, 0.),
+        (1., -g, 0.),
+        (0., -1., g),
+        (0., 1., g),
+        (0., -1., -g),
+        (0., 1., -g),
+        (g, 0., -1.),
+        (g, 0., 1.),
+        (-g, 0., -1.),
+        (-g, 0., 1.),
     ]
     .map(|(x, y, z)| Vec3::new(x, y, z).normalize())
     .to_vec();
     let mut indices: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
-        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
-        [8, 6, 7], [9, 8, 1],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
     ];
     for _ in 0..level {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
@@ -146,11 +176,16 @@ pub fn duplicates(seed: u64, copies: usize) -> Mesh {
     let mut random = Random::new(seed);
     let mut positions: Vec<Vec3> = (0..12).map(|_| random.in_cube()).collect();
     // A grid in the plane z = 0.25 with triangles that overlap.
-    positions.extend((0..16).map(|i| Vec3::new((i % 4) as f32 / 2.0 - 0.75, (i / 4) as f32 / 2.0 - 0.75, 0.25)));
+    positions
+        .extend((0..16).map(|i| Vec3::new((i % 4) as f32 / 2.0 - 0.75, (i / 4) as f32 / 2.0 - 0.75, 0.25)));
     let mut indices = Vec::new();
     for i in 0..copies {
         let k = 3 * (i as u32 % 4);
-        indices.push(if i % 3 == 0 { [k, k + 2, k + 1] } else { [k, k + 1, k + 2] });
+        indices.push(if i % 3 == 0 {
+            [k, k + 2, k + 1]
+        } else {
+            [k, k + 1, k + 2]
+        });
         indices.push([0; 3].map(|_| 12 + random.below(16) as u32));
     }
     Mesh::new(&format!("duplicates (seed {seed})"), &positions, indices)
@@ -160,7 +195,11 @@ pub fn duplicates(seed: u64, copies: usize) -> Mesh {
 pub fn ground(size: f32) -> Mesh {
     let p = |x: f32, z: f32| Vec3::new(x, -1.0, z) * Vec3::new(size, 1.0, size);
     let corners = [p(-1., -1.), p(1., -1.), p(1., 1.), p(-1., 1.)];
-    Mesh::new(&format!("ground of {size:e}"), &corners, vec![[0, 2, 1], [0, 3, 2]])
+    Mesh::new(
+        &format!("ground of {size:e}"),
+        &corners,
+        vec![[0, 2, 1], [0, 3, 2]],
+    )
 }
 
 /// A soup with corners that are NaN or infinite and with triangles without area.
@@ -181,9 +220,15 @@ pub fn broken(seed: u64) -> Mesh {
 
 /// One triangle.
 pub fn single() -> Mesh {
-    Mesh::new("single", &[Vec3::new(-0.5, -0.5, 0.0), Vec3::new(0.5, -0.5, 0.0), Vec3::new(0.0, 0.5, 0.0)], vec![[
-        0, 1, 2,
-    ]])
+    Mesh::new(
+        "single",
+        &[
+            Vec3::new(-0.5, -0.5, 0.0),
+            Vec3::new(0.5, -0.5, 0.0),
+            Vec3::new(0.0, 0.5, 0.0),
+        ],
+        vec![[0, 1, 2]],
+    )
 }
 
 /// Nothing.
@@ -193,8 +238,9 @@ pub fn empty() -> Mesh {
 
 /// A flat sheet of squares, all in one axis-aligned plane, with exactly equal spacing.
 pub fn sheet(n: u32) -> Mesh {
-    let positions: Vec<Vec3> =
-        (0..(n + 1) * (n + 1)).map(|i| Vec3::new((i % (n + 1)) as f32, 2.0, (i / (n + 1)) as f32)).collect();
+    let positions: Vec<Vec3> = (0..(n + 1) * (n + 1))
+        .map(|i| Vec3::new((i % (n + 1)) as f32, 2.0, (i / (n + 1)) as f32))
+        .collect();
     let indices = (0..n * n)
         .flat_map(|i| {
             let a = i / n * (n + 1) + i % n;

@@ -1,13 +1,17 @@
 //! Seeded meshes and rays that are hard on ray tracers, shared by the test programs.
 
-#![allow(dead_code, unreachable_pub, reason = "a module shared by test programs, each of which uses a part")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    reason = "a module shared by test programs, each of which uses a part"
+)]
 
 pub mod meshes;
 pub mod rays;
 
 use glam::Vec3;
 
-/// SplitMix64: small, and the same everywhere.
+/// The `SplitMix64` generator: small, and the same everywhere.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 

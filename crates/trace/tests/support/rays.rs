@@ -10,7 +10,11 @@ fn bounds(mesh: &Mesh) -> (Vec3, Vec3) {
     let finite = || mesh.positions().into_iter().filter(|p| p.is_finite());
     let low = finite().fold(Vec3::MAX, Vec3::min);
     let high = finite().fold(Vec3::MIN, Vec3::max);
-    if mesh.x.is_empty() { (Vec3::ZERO, Vec3::ONE) } else { (low * 0.5 + high * 0.5, high * 0.5 - low * 0.5) }
+    if mesh.x.is_empty() {
+        (Vec3::ZERO, Vec3::ONE)
+    } else {
+        (low * 0.5 + high * 0.5, high * 0.5 - low * 0.5)
+    }
 }
 
 /// A point of the mesh at which neighbours meet or which is otherwise special.
@@ -61,7 +65,9 @@ pub fn adversarial(mesh: &Mesh, seed: u64, count: usize) -> Vec<Ray> {
     let (centre, half) = bounds(mesh);
     let within = |random: &mut Random| centre + half * random.in_cube();
     let around = |random: &mut Random| centre + half * random.in_cube() * 3.0;
-    (0..count).map(|kind| one(mesh, kind, &mut random, &within, &around)).collect()
+    (0..count)
+        .map(|kind| one(mesh, kind, &mut random, &within, &around))
+        .collect()
 }
 
 fn one(
@@ -78,7 +84,11 @@ fn one(
         // Along an axis through a special point, from a face of its neighbours' boxes or from beyond.
         1 | 2 => {
             let axis = Vec3::AXES[random.below(3)] * if random.below(2) == 0 { 1.0 } else { -1.0 };
-            let back = if kind % 10 == 1 { random.below(3) as f32 } else { random.unit() };
+            let back = if kind % 10 == 1 {
+                random.below(3) as f32
+            } else {
+                random.unit()
+            };
             let size = (within(random) - target).abs().max_element();
             Ray::new(target - axis * (back * size), axis)
         }
