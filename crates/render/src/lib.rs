@@ -5,6 +5,7 @@
 //! the primaries of sRGB until the tone map.
 
 mod camera;
+pub mod compare;
 mod error;
 mod film;
 pub mod image_io;
@@ -13,6 +14,7 @@ pub mod texture;
 pub mod tonemap;
 
 pub use camera::CameraFrame;
+pub use compare::{CompareOptions, Comparison, compare};
 pub use error::{Error, Result};
 pub use film::{Film, LayerKind, Layers, NO_ID, Sample, TileMut};
 pub use image_io::{Picture, read_picture};
