@@ -82,22 +82,40 @@ fn default_vfov() -> f64 {
 /// [`Error::Io`] if the file cannot be read; [`Error::Malformed`] with line and column, or the scene's name, if
 /// it is not such a file or a camera in it cannot see (target at the eye, field of view not in (0, 180)).
 pub fn read_camera_file(path: &Path) -> Result<BTreeMap<String, CameraEntry>, Error> {
-    let bytes = read_file(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    let malformed = |place: String, problem: String| Error::Malformed { path: path.into(), place, problem };
+    let bytes = read_file(path).map_err(|source| Error::Io {
+        path: path.into(),
+        source,
+    })?;
+    let malformed = |place: String, problem: String| Error::Malformed {
+        path: path.into(),
+        place,
+        problem,
+    };
     let entries: BTreeMap<String, CameraEntry> = serde_json::from_slice(&bytes).map_err(|e| {
         let message = e.to_string();
-        let message = message.rsplit_once(" at line ").map_or(message.as_str(), |(m, _)| m);
-        malformed(format!("line {}, column {}", e.line(), e.column()), message.to_owned())
+        let message = message
+            .rsplit_once(" at line ")
+            .map_or(message.as_str(), |(m, _)| m);
+        malformed(
+            format!("line {}, column {}", e.line(), e.column()),
+            message.to_owned(),
+        )
     })?;
     for (name, entry) in &entries {
-        entry.check().map_err(|problem| malformed(format!("scene {name:?}"), problem.into()))?;
+        entry
+            .check()
+            .map_err(|problem| malformed(format!("scene {name:?}"), problem.into()))?;
     }
     Ok(entries)
 }
 
 /// The entry for a scene file: the one whose `file` ends like the scene's path, else the one named like its stem.
 pub fn find_camera<'a>(entries: &'a BTreeMap<String, CameraEntry>, scene: &Path) -> Option<&'a CameraEntry> {
-    let by_file = entries.values().find(|e| e.file.as_ref().is_some_and(|f| !f.is_empty() && scene.ends_with(f)));
+    let by_file = entries.values().find(|e| {
+        e.file
+            .as_ref()
+            .is_some_and(|f| !f.is_empty() && scene.ends_with(f))
+    });
     by_file.or_else(|| entries.get(scene.file_stem()?.to_str()?))
 }
 
@@ -122,7 +140,10 @@ impl CameraEntry {
             eye: self.eye,
             forward,
             up: up.unwrap_or_else(|| forward.any_orthonormal_vector()),
-            projection: Projection::Perspective { vfov: self.vfov_deg.to_radians(), aspect: None },
+            projection: Projection::Perspective {
+                vfov: self.vfov_deg.to_radians(),
+                aspect: None,
+            },
         }
     }
 
@@ -160,7 +181,10 @@ impl AreaLight {
     fn light_for(&self, center: DVec3) -> PosedLight {
         let normal = self.edge_u.cross(self.edge_v);
         let direction = normal.try_normalize().unwrap_or(DVec3::NEG_Y);
-        let axis_x = self.edge_u.try_normalize().unwrap_or_else(|| direction.any_orthonormal_vector());
+        let axis_x = self
+            .edge_u
+            .try_normalize()
+            .unwrap_or_else(|| direction.any_orthonormal_vector());
         let to_center = center - self.center;
         let cosine = to_center.normalize_or(direction).dot(direction).max(0.1);
         let radiance = std::f64::consts::PI * to_center.length_squared() / (normal.length() * cosine);
@@ -171,7 +195,11 @@ impl AreaLight {
             axis_x,
             // The light is in its X-Y plane and shines along -Z.
             axis_y: axis_x.cross(direction),
-            power: Vec3::splat(if radiance.is_finite() { radiance as f32 } else { 0.0 }),
+            power: Vec3::splat(if radiance.is_finite() {
+                radiance as f32
+            } else {
+                0.0
+            }),
             range: f32::INFINITY,
             kind: LightKind::Rectangle {
                 width: self.edge_u.length() as f32,

@@ -23,16 +23,26 @@ const KEY_RADIANCE: f64 = 0.9;
 /// A camera that shows all of the frame in a picture of this width over height. A frame without triangles, or of one
 /// point, is looked at from 2 metres.
 pub fn default_camera(frame: &FrameGeometry, aspect: f64) -> PosedCamera {
-    let (lo, hi) = frame.bounds().map_or((DVec3::ZERO, DVec3::ZERO), |(l, h)| (l.as_dvec3(), h.as_dvec3()));
+    let (lo, hi) = frame
+        .bounds()
+        .map_or((DVec3::ZERO, DVec3::ZERO), |(l, h)| (l.as_dvec3(), h.as_dvec3()));
     let center = (lo + hi) / 2.0;
     let half = (hi - lo) / 2.0;
 
-    let back = DVec3::new(ELEVATION.cos() * AZIMUTH.sin(), ELEVATION.sin(), ELEVATION.cos() * AZIMUTH.cos());
+    let back = DVec3::new(
+        ELEVATION.cos() * AZIMUTH.sin(),
+        ELEVATION.sin(),
+        ELEVATION.cos() * AZIMUTH.cos(),
+    );
     let right = DVec3::Y.cross(back).normalize();
     let up = back.cross(right);
     let camera_from_world = DMat3::from_cols(right, up, back).transpose();
 
-    let aspect = if aspect.is_finite() && aspect > 0.0 { aspect } else { 1.0 };
+    let aspect = if aspect.is_finite() && aspect > 0.0 {
+        aspect
+    } else {
+        1.0
+    };
     let tan_y = (VFOV / 2.0).tan() * FILL;
     let tan_x = tan_y * aspect;
     // A corner at (x, y, z) before the camera at distance d is in view if |x| <= tan_x (d - z).
@@ -47,7 +57,10 @@ pub fn default_camera(frame: &FrameGeometry, aspect: f64) -> PosedCamera {
         eye: frame.origin + center + back * distance,
         forward: -back,
         up,
-        projection: Projection::Perspective { vfov: VFOV, aspect: None },
+        projection: Projection::Perspective {
+            vfov: VFOV,
+            aspect: None,
+        },
     }
 }
 

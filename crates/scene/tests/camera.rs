@@ -18,7 +18,7 @@ fn read(text: &str) -> Result<BTreeMap<String, CameraEntry>, Error> {
 }
 
 const TWO: &str = r#"{
-    "low": { "file": "bench/low.ply", "triangles": 12, "eye": [0, 0, 5], "target": [0, 0, 0], "remark": "any",
+    "low": { "file": "bench/pot.ply", "triangles": 12, "eye": [0, 0, 5], "target": [0, 0, 0], "remark": "any",
              "up": [0, 1, 1], "vfov_deg": 60, "point_light": [3, 0, 0],
              "area_light": { "center": [0, 2, 0], "edge_u": [0.5, 0, 0], "edge_v": [0, 0, 0.2] } },
     "high": { "eye": [1, 2, 3], "target": [1, 2, 4.5] } }"#;
@@ -28,10 +28,10 @@ fn entries_are_found_by_file_then_by_stem() {
     let entries = read(TWO).unwrap();
     assert_eq!(entries["low"].triangles, Some(12));
     let eye = |path: &str| find_camera(&entries, Path::new(path)).map(|e| e.eye.z);
-    assert_eq!(eye("/scenes/bench/low.ply"), Some(5.0));
+    assert_eq!(eye("/scenes/bench/pot.ply"), Some(5.0));
     assert_eq!(eye("elsewhere/high.glb"), Some(3.0));
     assert_eq!(eye("elsewhere/low.ply"), Some(5.0));
-    assert_eq!(eye("workbench/slow.ply"), None);
+    assert_eq!(eye("workbench/pot.ply"), None);
 }
 
 #[test]

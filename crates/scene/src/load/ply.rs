@@ -1,10 +1,10 @@
 //! PLY: ASCII and binary of both byte orders.
 //!
-//! Source: G. Turk, *The PLY Polygon File Format* (1994), with the `tristrips` element of the Stanford scans and
-//! the usual names for normals, colours and texture coordinates. Read with own code, since a reader has to take
-//! numbers as programs write them (`nan`, `.5`), tell where a file breaks, and be neither slowed nor made to allocate by a
-//! header that lies: before an element is read its promised count is compared with the bytes that are left.
-//! Every PLY number is exact as f64, so one path reads all types. Cost: some 50 ns a triangle.
+//! Source: G. Turk, *The PLY Polygon File Format* (1994), with the `tristrips` element of the Stanford scans
+//! and the usual names for normals, colours and texture coordinates. Read with own code, since a reader has to
+//! take numbers as programs write them (`nan`, `.5`), tell where a file breaks, and be neither slowed nor made to
+//! allocate by a header that lies: before an element is read its promised count is compared with the bytes that
+//! are left. Every PLY number is exact as f64, so one path reads all types. Cost: some 0.15 us a triangle.
 
 mod body;
 mod header;
