@@ -13,10 +13,12 @@ use crate::{LightKind, Projection};
 /// All triangles of one frame with the posed cameras and lights. Triangle ids (`prim`) index `indices`.
 ///
 /// Triangles with a corner that is not finite, or with zero area, are not in here: they are counted in
-/// `dropped_non_finite` and `dropped_degenerate`.
+/// `dropped_non_finite` and `dropped_degenerate`. Their vertices stay, so a vertex that no triangle uses need
+/// not be finite.
 #[derive(Clone, Debug, Default)]
 pub struct FrameGeometry {
-    /// World position of the local zero point.
+    /// World position of the local zero point: zero, unless the scene's rest pose lies more than 16 of its half
+    /// diagonals away from the world's zero. The same at all times.
     pub origin: DVec3,
     /// Vertex x, relative to `origin`.
     pub x: Vec<f32>,
