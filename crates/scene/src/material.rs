@@ -53,7 +53,8 @@ pub struct Material {
     pub specular: f32,
     /// Specular strength in alpha (linear).
     pub specular_texture: Option<TextureRef>,
-    /// Colour of dielectric reflection at normal incidence.
+    /// Colour of dielectric reflection at normal incidence: a factor on the reflectance that `ior` gives (0.04 for
+    /// 1.5). It may be above 1; the product is to be cut at 1.
     pub specular_color: Vec3,
     /// Specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
@@ -133,7 +134,11 @@ pub struct TextureTransform {
 
 impl Default for TextureTransform {
     fn default() -> Self {
-        Self { offset: Vec2::ZERO, rotation: 0.0, scale: Vec2::ONE }
+        Self {
+            offset: Vec2::ZERO,
+            rotation: 0.0,
+            scale: Vec2::ONE,
+        }
     }
 }
 

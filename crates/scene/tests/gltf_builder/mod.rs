@@ -1,8 +1,7 @@
 //! Builds small glTF files, sound and broken, in a temporary folder.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use base64::Engine;
 use rayward_scene::{Error, LoadOptions, Scene, load};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -16,7 +15,7 @@ pub(super) const F32: u32 = 5126;
 pub(super) struct Builder {
     pub(super) json: Value,
     pub(super) bin: Vec<u8>,
-    folder: TempDir,
+    pub(super) folder: TempDir,
 }
 
 /// Little-endian bytes of floats.
@@ -63,11 +62,6 @@ impl Builder {
         push(&mut self.json["accessors"], accessor)
     }
 
-    /// The file's folder.
-    pub(super) fn folder(&self) -> &Path {
-        self.folder.path()
-    }
-
     /// The primitive of the triangle.
     pub(super) fn primitive(&mut self) -> &mut Value {
         &mut self.json["meshes"][0]["primitives"][0]
@@ -92,17 +86,6 @@ impl Builder {
             out.extend(chunk);
         }
         out
-    }
-
-    /// The text of a `.gltf` with its buffer inside.
-    pub(super) fn gltf(&self) -> String {
-        let mut json = self.json.clone();
-        let uri = format!(
-            "data:;base64,{}",
-            base64::engine::general_purpose::STANDARD.encode(&self.bin)
-        );
-        json["buffers"] = json!([{"byteLength": self.bin.len(), "uri": uri}]);
-        json.to_string()
     }
 
     /// Writes a file into the folder.
