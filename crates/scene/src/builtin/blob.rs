@@ -3,16 +3,15 @@
 
 use glam::{Vec3, dvec3, vec3};
 
-use super::shapes::Surface;
 use super::stage::{Stage, placed, sampled, standing};
 use super::statue::{hare, serpent};
-use crate::{Primitive, Scene};
+use crate::Scene;
 
 /// One hare of `20 * frequency^2` triangles and nothing else.
 pub(super) fn blob(name: &str, frequency: u32) -> Scene {
     let mut stage = Stage::new(name);
     let clay = stage.matte("clay", [0.76, 0.52, 0.36], 0.7);
-    let mesh = stage.mesh("hare", vec![smooth(hare(frequency), clay)]);
+    let mesh = stage.mesh("hare", vec![hare(frequency).into_smooth_primitive(clay)]);
     stage.place("hare", mesh, None, standing(Vec3::ZERO, 0.0));
     let heart = dvec3(0.0, 0.47, 0.0);
     stage.camera("front", dvec3(1.15, 0.85, 2.0), heart, 30.0);
@@ -27,8 +26,8 @@ pub(super) fn collide() -> Scene {
     let mut stage = Stage::new("collide");
     let clay = stage.matte("clay", [0.76, 0.52, 0.36], 0.7);
     let jade = stage.matte("jade", [0.20, 0.46, 0.30], 0.35);
-    let hare_mesh = stage.mesh("hare", vec![smooth(hare(59), clay)]);
-    let serpent_mesh = stage.mesh("serpent", vec![smooth(serpent(128, 713), jade)]);
+    let hare_mesh = stage.mesh("hare", vec![hare(59).into_smooth_primitive(clay)]);
+    let serpent_mesh = stage.mesh("serpent", vec![serpent(128, 713).into_smooth_primitive(jade)]);
     let away = vec3(-1.75, 0.0, 0.1);
     let hare_node = stage.place("hare", hare_mesh, None, standing(away, 1.2));
     stage.place(
@@ -48,9 +47,4 @@ pub(super) fn collide() -> Scene {
     stage.lamp("key", dvec3(-2.5, 5.0, 4.0), middle, 0.85, [1.0, 0.97, 0.92]);
     stage.lamp("fill", dvec3(5.0, 2.0, 3.0), middle, 0.2, [0.85, 0.92, 1.0]);
     stage.scene
-}
-
-/// Shaded smoothly all over.
-fn smooth(surface: Surface, material: usize) -> Primitive {
-    surface.into_primitive(180.0, material)
 }

@@ -8,6 +8,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Affine3A, Quat, Vec2, Vec3, dvec3, vec2, vec3};
 
+use super::figure::{Clothes, STRIDE, figure};
 use super::shapes::{Surface, arc, cuboid, lathe, ribbon, rounded_cuboid};
 use super::stage::{Stage, placed, standing};
 use super::statue::hare;
@@ -57,6 +58,7 @@ pub(super) fn courtyard() -> Scene {
     }
     fountain(&mut stage, &paints);
     furniture(&mut stage, &paints);
+    people(&mut stage);
     let middle = dvec3(0.0, 1.6, -1.0);
     stage.camera("court", dvec3(-7.3, 2.4, 5.4), dvec3(0.8, 2.3, -2.0), 54.0);
     stage.camera("gallery", dvec3(8.2, 6.2, 5.6), dvec3(-1.5, 0.8, -1.5), 55.0);
@@ -109,18 +111,17 @@ fn walls(stage: &mut Stage, paints: &Paints) {
     for side in 0..4 {
         let (turn, along, back) = side_frame(side);
         let (length, count) = (outer[along], outer[along] as usize);
+        // The short walls end inside the long ones.
+        let end = length + [0.4, 0.2][side % 2];
         let wall = cuboid(
-            vec3(-length - 0.4, -0.2, 0.0),
-            vec3(
-                length + if side % 2 == 0 { 0.4 } else { 0.0 },
-                LEVELS[3] + 1.1,
-                0.4,
-            ),
+            vec3(-end, -0.2, 0.0),
+            vec3(end, LEVELS[3] + 1.1, 0.4),
             [count, 5, 1],
         );
         let to_wall = turn * Affine3A::from_translation(vec3(0.0, 0.0, back + DEPTH));
         plaster.join(&wall.moved(to_wall));
-        let mitre = |z: f32| inner[along] + z;
+        // A hair longer than the mitre: neighbours overlap instead of sharing a face.
+        let mitre = |z: f32| inner[along] + z + 0.01;
         let slab = |low: f32, high: f32, front: f32, rear: f32| {
             let quarter = |x: f32, z: f32| vec2(x * mitre(z), z);
             let (left, right) = (
@@ -170,8 +171,8 @@ fn openings(stage: &mut Stage, paints: &Paints) {
     let frame = arch_block(1.2, 1.56, 2.3, 0.0, 0.18);
     let posts = [-1.0, 1.0].map(|side| {
         cuboid(
-            vec3(side * 0.69 - 0.09, -0.05, -0.12),
-            vec3(side * 0.69 + 0.09, 2.3, 0.1),
+            vec3(side * 0.69 - 0.1, -0.05, -0.13),
+            vec3(side * 0.69 + 0.1, 2.32, 0.1),
             [1, 3, 1],
         )
     });
@@ -225,12 +226,13 @@ fn arcade(stage: &mut Stage, paints: &Paints, side: usize) {
             paints.stone,
         );
         let span = BAY - 0.42;
+        // Neighbours overlap by a hair instead of sharing a face.
         let arch = arch_block(
             span,
-            BAY,
+            BAY + 0.004,
             spring,
             top - spring - span / 2.0,
-            0.42 - 0.04 * storey as f32,
+            0.41 - 0.04 * storey as f32,
         );
         let arch = stage.solid("arch", arch, paints.plaster);
         for i in 0..count {
@@ -260,7 +262,6 @@ fn column(height: f32, radius: f32, sides: usize) -> Surface {
         vec2(r * 1.4, 0.22),
         vec2(r * 1.05, 0.30),
         vec2(r, 0.5),
-        vec2(r * 1.0, height * 0.5),
         vec2(r * 0.86, height - 0.36),
         vec2(r * 1.0, height - 0.32),
         vec2(r * 1.3, height - 0.1),
@@ -290,8 +291,8 @@ fn balustrade() -> Surface {
         cuboid(vec3(-half, -0.05, -0.11), vec3(half, 0.08, 0.11), [2, 1, 1]),
         cuboid(vec3(-half, 0.74, -0.13), vec3(half, 0.88, 0.13), [2, 1, 1]),
     ]);
-    for i in 0..4 {
-        rail.join(&lathe(&profile, 6).at(vec3((i as f32 - 1.5) * 0.5, 0.0, 0.0)));
+    for i in 0..3 {
+        rail.join(&lathe(&profile, 6).at(vec3((i as f32 - 1.0) * 0.6, 0.0, 0.0)));
     }
     rail
 }
@@ -339,14 +340,14 @@ fn fountain(stage: &mut Stage, paints: &Paints) {
             24,
         )
     };
-    stage.show("basin", lathe(&basin, 28), paints.stone);
+    stage.show("basin", lathe(&basin, 24), paints.stone);
     stage.show("bowl", lathe(&bowl, 18), paints.stone);
     stage.show(
         "water",
         Surface::joined([pool(1.65, 0.1, 0.56), pool(0.8, 1.5, 1.7)]),
         paints.water,
     );
-    let statue = stage.mesh("hare", vec![hare(7).into_primitive(180.0, paints.bronze)]);
+    let statue = stage.mesh("hare", vec![hare(7).into_smooth_primitive(paints.bronze)]);
     stage.place("hare", statue, None, placed(vec3(0.0, 2.03, 0.0), -0.8, 0.95));
 }
 
@@ -381,12 +382,12 @@ fn furniture(stage: &mut Stage, paints: &Paints) {
         vec2(0.24, 0.86),
         vec2(0.0, 0.84),
     ];
-    let vase = stage.solid("vase", lathe(&profile, 12), paints.clay);
+    let vase = stage.solid("vase", lathe(&profile, 10), paints.clay);
     let shrub = super::shapes::geosphere(4).warped(|p| {
         let swell = 1.0 + 0.22 * super::random::fractal_noise(p * 2.6, 2, 5);
         vec3(p.x * 0.42, p.y * 0.46, p.z * 0.42) * swell + vec3(0.0, 1.22, 0.0)
     });
-    let shrub = stage.mesh("shrub", vec![shrub.into_primitive(180.0, paints.leaf)]);
+    let shrub = stage.mesh("shrub", vec![shrub.into_smooth_primitive(paints.leaf)]);
     let corners = [
         vec3(6.6, 0.0, 4.4),
         vec3(-6.6, 0.0, -4.4),
@@ -397,4 +398,29 @@ fn furniture(stage: &mut Stage, paints: &Paints) {
         stage.place("vase", vase, None, standing(at, 0.0));
         stage.place("shrub", shrub, None, standing(at, i as f32));
     }
+}
+
+/// One walks across the court in four seconds, one waits by the fountain.
+fn people(stage: &mut Stage) {
+    let mut clothes = Clothes {
+        skin: stage.matte("skin", [0.62, 0.36, 0.25], 0.6),
+        hair: stage.matte("hair", [0.06, 0.04, 0.03], 0.5),
+        shirt: stage.matte("red cloth", [0.55, 0.08, 0.06], 0.9),
+        trousers: stage.matte("grey cloth", [0.14, 0.14, 0.16], 0.9),
+        shoes: stage.matte("leather", [0.10, 0.05, 0.03], 0.5),
+    };
+    let waiting = figure(stage, "waiting", clothes, standing(vec3(2.7, 0.0, 1.0), -1.9));
+    waiting.bend_arms(stage, [(0.35, 1.5), (0.35, 1.45)]);
+    clothes.shirt = stage.matte("blue cloth", [0.07, 0.16, 0.42], 0.9);
+    let (from, yaw, cycles) = (vec3(-4.5, 0.0, -2.7), 0.55, 4);
+    let walking = figure(stage, "walking", clothes, standing(from, yaw));
+    let animation = stage.animation("walk");
+    walking.walk(stage, animation, 1.0, cycles, 0.0);
+    let way = Quat::from_rotation_y(yaw) * Vec3::Z * STRIDE * cycles as f32;
+    stage.slide(
+        animation,
+        walking.root,
+        vec![0.0, cycles as f32],
+        vec![from, from + way],
+    );
 }

@@ -39,7 +39,7 @@ pub(super) fn noise(p: Vec3, seed: u64) -> f32 {
         let at = cell + IVec3::new(x, y, z);
         let key = [at.x, at.y, at.z]
             .iter()
-            .fold(seed, |key, &c| mix(key.wrapping_add(c as u64 + STEP)));
+            .fold(seed, |key, &c| mix(key.wrapping_add(c as u64).wrapping_add(STEP)));
         (key >> 40) as f32 / (1u64 << 23) as f32 - 1.0
     };
     let mix_x = |y, z| value(0, y, z) + (value(1, y, z) - value(0, y, z)) * w.x;
@@ -50,7 +50,7 @@ pub(super) fn noise(p: Vec3, seed: u64) -> f32 {
 /// `octaves` of [`noise`], each of twice the frequency and half the height of the one before.
 pub(super) fn fractal_noise(p: Vec3, octaves: u32, seed: u64) -> f32 {
     (0..octaves)
-        .map(|o| noise(p * (1u32 << o) as f32, seed + u64::from(o)) / (1u32 << o) as f32)
+        .map(|o| noise(p * (1u32 << o) as f32, seed.wrapping_add(u64::from(o))) / (1u32 << o) as f32)
         .sum()
 }
 

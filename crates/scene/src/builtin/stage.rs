@@ -82,6 +82,17 @@ impl Stage {
         })
     }
 
+    /// Adds a bare node with a translation, to be turned by an animation.
+    pub(super) fn place_joint(&mut self, name: &str, parent: usize, offset: Vec3) -> usize {
+        let transform = standing(offset, 0.0);
+        self.node(Node {
+            name: name.into(),
+            parent: Some(parent),
+            transform,
+            ..Node::default()
+        })
+    }
+
     /// Adds a surface and shows it where it is.
     pub(super) fn show(&mut self, name: &str, surface: Surface, material: usize) -> usize {
         let mesh = self.solid(name, surface, material);

@@ -47,7 +47,7 @@ pub(in super::super) fn rounded_cuboid(
 }
 
 /// A box with cell borders at the given increasing coordinates along X, Y and Z.
-pub(in super::super) fn cuboid_of(stops: &[Vec<f32>; 3]) -> Surface {
+fn cuboid_of(stops: &[Vec<f32>; 3]) -> Surface {
     let cells = stops.each_ref().map(|s| s.len() - 1);
     let mut surface = Surface::default();
     let mut known = vec![u32::MAX; stops.iter().map(Vec::len).product()];

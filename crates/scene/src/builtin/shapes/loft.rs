@@ -72,17 +72,24 @@ pub(in super::super) fn lathe(profile: &[Vec2], sides: usize) -> Surface {
 
 /// A tube of round section along `path`; one radius a point. The ends are closed by flat fans.
 pub(in super::super) fn tube(path: &[Vec3], radii: &[f32], sides: usize) -> Surface {
+    loft(
+        &rings(path, radii, sides),
+        Ends::Fans(path[0], path[path.len() - 1]),
+    )
+}
+
+/// The loops of a [`tube`].
+pub(in super::super) fn rings(path: &[Vec3], radii: &[f32], sides: usize) -> Vec<Vec<Vec3>> {
     let last = path.len() - 1;
-    let mut side = (path[1] - path[0]).any_orthonormal_vector();
-    let rows: Vec<_> = (0..=last)
+    let mut side = (path[1] - path[0]).normalize().any_orthonormal_vector();
+    (0..=last)
         .map(|i| {
             let along = (path[(i + 1).min(last)] - path[i.saturating_sub(1)]).normalize();
             // Carrying the side vector along keeps the tube from twisting.
             side = side.reject_from_normalized(along).normalize();
             disc_loop(path[i], side * radii[i], along.cross(side) * radii[i], sides)
         })
-        .collect();
-    loft(&rows, Ends::Fans(path[0], path[last]))
+        .collect()
 }
 
 /// A solid between two curves in the XY plane, from `z.x` to `z.y` in depth: an arch, a plank, a gable. The

@@ -7,9 +7,9 @@ mod cuboid;
 mod geosphere;
 mod loft;
 
-pub(super) use cuboid::{cuboid, cuboid_of, rounded_cuboid};
+pub(super) use cuboid::{cuboid, rounded_cuboid};
 pub(super) use geosphere::geosphere;
-pub(super) use loft::{Ends, arc, bezier, disc_loop, lathe, loft, plank, ribbon, smooth_path, tube};
+pub(super) use loft::{Ends, arc, bezier, disc_loop, lathe, loft, plank, ribbon, rings, smooth_path, tube};
 
 use glam::{Affine3A, Vec3};
 
@@ -71,7 +71,8 @@ impl Surface {
     /// The surface as a primitive with shading normals: faces that meet at less than `crease` degrees are
     /// shaded as one smooth surface, others get a sharp edge (their vertices are split).
     pub(super) fn into_primitive(self, crease: f32, material: usize) -> Primitive {
-        let face_normals: Vec<Vec3> = self.triangles.iter().map(|&t| self.area_normal(t)).collect();
+        let areas: Vec<Vec3> = self.triangles.iter().map(|&t| self.area_normal(t)).collect();
+        let units: Vec<Vec3> = areas.iter().map(|n| n.normalize_or_zero()).collect();
         let (starts, faces) = self.faces_of_vertices();
         let limit = crease.to_radians().cos();
         let mut primitive = Primitive {
@@ -83,13 +84,9 @@ impl Surface {
             let around = &faces[starts[v] as usize..starts[v + 1] as usize];
             let first = primitive.positions.len();
             for &f in around {
-                let own = face_normals[f as usize].normalize_or_zero();
-                let sum: Vec3 = around
-                    .iter()
-                    .map(|&g| face_normals[g as usize])
-                    .filter(|n| n.normalize_or_zero().dot(own) >= limit)
-                    .sum();
-                let normal = sum.normalize_or(own);
+                let own = units[f as usize];
+                let alike = around.iter().filter(|&&g| units[g as usize].dot(own) >= limit);
+                let normal = alike.map(|&g| areas[g as usize]).sum::<Vec3>().normalize_or(own);
                 // Equal sets of faces sum in the same order, so equal normals are equal in bits.
                 let known = primitive.normals[first..].iter().position(|&n| n == normal);
                 let index = first + known.unwrap_or(primitive.normals.len() - first);
@@ -97,11 +94,35 @@ impl Surface {
                     primitive.positions.push(position);
                     primitive.normals.push(normal);
                 }
-                let corner = self.triangles[f as usize].iter().position(|&i| i as usize == v);
-                primitive.triangles[f as usize][corner.unwrap_or(0)] = index as u32;
+                let f = f as usize;
+                for (new, &old) in primitive.triangles[f].iter_mut().zip(&self.triangles[f]) {
+                    if old as usize == v {
+                        *new = index as u32;
+                    }
+                }
             }
         }
         primitive
+    }
+
+    /// The surface as a primitive that is shaded smoothly all over; its vertices stay shared.
+    pub(super) fn into_smooth_primitive(self, material: usize) -> Primitive {
+        let mut normals = vec![Vec3::ZERO; self.positions.len()];
+        for &t in &self.triangles {
+            let area = self.area_normal(t);
+            for i in t {
+                normals[i as usize] += area;
+            }
+        }
+        let normals = normals.into_iter().map(Vec3::normalize_or_zero).collect();
+        let Self { positions, triangles } = self;
+        Primitive {
+            positions,
+            normals,
+            triangles,
+            material,
+            ..Primitive::default()
+        }
     }
 
     /// Face normal times twice the area.
