@@ -16,7 +16,7 @@
 mod accel;
 mod bins;
 pub mod brute;
-mod bvh;
+pub mod bvh;
 pub mod exact;
 mod eye_grid;
 mod kernel;

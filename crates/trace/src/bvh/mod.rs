@@ -6,8 +6,8 @@
 //! Layout: 128 bytes a node with its four child boxes side by side, 40 bytes a triangle in leaf order (its corners,
 //! so that a leaf test touches one run of memory), at most four triangles a leaf. Units are the triangles'.
 //!
-//! Answers equal [`crate::BruteForce`]'s bit for bit: box tests are conservative ([`slab`]), a f64 filter drops
-//! triangles that are certainly missed, and [`crate::exact`] decides on the rest.
+//! Answers equal [`crate::BruteForce`]'s bit for bit: box tests are conservative (see the header of `bvh/slab.rs`),
+//! an f64 filter drops triangles that are certainly missed, and [`crate::exact`] decides on the rest.
 //!
 //! Limits: build once, trace often; there is no refit. Coordinates beyond 2^125 are traced correctly, but every
 //! triangle is tested.
@@ -27,7 +27,7 @@ use build::{Built, Leaf};
 use node::{INNER, WIDTH};
 use slab::Slab;
 
-/// A hierarchy over the triangles of one frame. See the module's documentation.
+/// A hierarchy over the triangles of one frame. See the [module](self).
 #[derive(Clone, Debug)]
 pub struct Bvh<'a> {
     triangles: Triangles<'a>,
