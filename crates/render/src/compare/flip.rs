@@ -15,7 +15,7 @@ use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
 use crate::Picture;
-use crate::tonemap::decode_srgb;
+use crate::tonemap::{decode_srgb, unit};
 
 /// Exponent of colour differences.
 const COLOR_EXPONENT: f32 = 0.7;
@@ -89,7 +89,7 @@ impl Seen {
                 let linear = pixel
                     .truncate()
                     .to_array()
-                    .map(|v| decode_srgb(f64::from(v.max(0.0).min(1.0))) as f32);
+                    .map(|v| decode_srgb(f64::from(unit(v))) as f32);
                 let xyz = XYZ_FROM_RGB * Vec3::from(linear) / white;
                 Vec3::new(
                     116.0 * xyz.y - 16.0,

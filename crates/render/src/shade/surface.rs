@@ -3,7 +3,7 @@
 //! Normals: the geometric one is that of the triangle's plane, in f64; the shading normal is interpolated where
 //! an object has normals and bent by the normal map. Both are turned towards the viewer, so that back faces are
 //! shaded like front faces. Where an object has a normal map but no tangents, these follow from the triangle's
-//! texture coordinates as in MikkTSpace, not smoothed over vertices.
+//! texture coordinates as in `MikkTSpace`, not smoothed over vertices.
 //!
 //! Textures are filtered by the footprint of the pixel on the surface (Akenine-Möller et al., "Texture Level of
 //! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce).

@@ -2,7 +2,7 @@
 //!
 //! A [`Texture`] is one use of an image by a material: pyramid, wrapping, filtering, and the affine map of
 //! `KHR_texture_transform`. Filtering is bilinear in a level and linear between two levels, in linear light.
-//! Which level is the caller's choice ([`Texture::sample`] takes it in levels, 0 the image itself).
+//! Which level is the caller's choice ([`Textures::sample`] takes it in levels, 0 the image itself).
 //!
 //! Layout: 4 bytes a texel in the image's own encoding; level 0 is borrowed from the scene, the other levels cost
 //! another third and exist only for samplers that ask for mipmaps. Cost: some 15 ns for a bilinear sample.

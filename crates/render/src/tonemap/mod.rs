@@ -126,12 +126,7 @@ impl ToneMapper {
                 (color - Vec3::splat(self.previous.min)) / width
             }
         };
-        // `max` returns its other operand for a NaN.
-        Vec3::new(
-            mapped.x.max(0.0).min(1.0),
-            mapped.y.max(0.0).min(1.0),
-            mapped.z.max(0.0).min(1.0),
-        )
+        Vec3::new(unit(mapped.x), unit(mapped.y), unit(mapped.z))
     }
 
     /// Finishes a frame: its range scales the next one. An empty range changes nothing.
@@ -165,6 +160,12 @@ impl ToneMapper {
         );
         bytes
     }
+}
+
+/// Cut off at 0 and 1; 0 for what is not a number, which `clamp` would keep.
+#[inline]
+pub(crate) fn unit(value: f32) -> f32 {
+    if value > 0.0 { value.min(1.0) } else { 0.0 }
 }
 
 /// Pixels a task, enough to make the scheduling free.

@@ -71,8 +71,12 @@ static DECODE: LazyLock<[f32; 256]> =
 #[inline]
 pub fn encode_srgb8(linear: f32) -> u8 {
     let table = &*ENCODE;
-    // `max` returns its other operand for a NaN.
-    let x = linear.max(SMALLEST).min(1.0);
+    // Not `clamp`, which keeps a NaN.
+    let x = if linear > SMALLEST {
+        linear.min(1.0)
+    } else {
+        SMALLEST
+    };
     let floor = table.floor[((x.to_bits() >> SHIFT) - FIRST_BUCKET) as usize];
     floor + u8::from(x >= table.step[floor as usize])
 }

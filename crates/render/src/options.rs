@@ -1,0 +1,59 @@
+//! What is asked of a frame, as plain data.
+
+use glam::Vec3;
+use rayward_trace::SimdLevel;
+
+use crate::Layers;
+
+/// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with hard shadows.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderOptions {
+    /// Width of the picture in pixels.
+    pub width: u32,
+    /// Height of the picture in pixels.
+    pub height: u32,
+    /// Whether lights cast shadows.
+    pub shadows: bool,
+    /// Which sides of triangles cast them.
+    pub casters: CasterPolicy,
+    /// Radiance that surrounds the scene, for surfaces that no light reaches.
+    pub ambient: Vec3,
+    /// Radiance where no surface is seen.
+    pub background: Vec3,
+    /// Layers to keep besides the colour.
+    pub layers: Layers,
+    /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
+    /// back faces alone as casters.
+    pub paper: bool,
+    /// Instruction set of the kernels; the picture does not depend on it.
+    pub level: SimdLevel,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            width: 1920,
+            height: 1080,
+            shadows: true,
+            casters: CasterPolicy::Auto,
+            ambient: Vec3::splat(0.1),
+            background: Vec3::new(0.32, 0.4, 0.5),
+            layers: Layers::default(),
+            paper: false,
+            level: SimdLevel::detect(),
+        }
+    }
+}
+
+/// Which sides of triangles cast shadows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CasterPolicy {
+    /// Back faces of closed components that hold neither the eye nor the light, both sides of the rest: the
+    /// same shadows as `Both`, at a lower cost.
+    #[default]
+    Auto,
+    /// Both sides of all.
+    Both,
+    /// Back faces of all, as in HM08: wrong shadows where surfaces are open.
+    Back,
+}

@@ -1,0 +1,43 @@
+//! What a frame cost.
+
+use std::time::Duration;
+
+/// Counts and times of one frame.
+#[derive(Clone, Debug, Default)]
+pub struct FrameStats {
+    /// Triangles in the frame.
+    pub triangles: usize,
+    /// Triangles left out because a corner was not finite.
+    pub dropped_non_finite: usize,
+    /// Triangles left out because they had no area.
+    pub dropped_degenerate: usize,
+    /// The structures built for this frame.
+    pub structures: Vec<StructureStats>,
+    /// Eye rays traced: one a pixel.
+    pub eye_rays: u64,
+    /// Shadow rays asked for: one for each pixel and light whose surface faces the light.
+    pub shadow_rays: u64,
+    /// Pixels whose closest triangle was decided by exact arithmetic.
+    pub exact_pixels: u64,
+    /// Shadow rays answered by the nearest distance of their cell alone.
+    pub lit_by_cell: u64,
+    /// Wall time of all builds.
+    pub build: Duration,
+    /// Wall time of all tiles: tracing and shading.
+    pub trace: Duration,
+}
+
+/// Cost of one structure.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct StructureStats {
+    /// What it is for.
+    pub name: String,
+    /// Wall time of its build.
+    pub build: Duration,
+    /// Bytes it holds.
+    pub bytes: usize,
+    /// Cells, or nodes of a hierarchy.
+    pub cells: usize,
+    /// References from cells to triangles.
+    pub references: usize,
+}
