@@ -37,10 +37,39 @@ fn unpaired_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     bad
 }
 
+/// Triangles that hang together by their corners.
+fn components(triangles: &[[u32; 3]]) -> Vec<Vec<usize>> {
+    let count = triangles.iter().flatten().max().map_or(0, |&m| m as usize + 1);
+    let mut leader: Vec<usize> = (0..count).collect();
+    fn find(leader: &mut [usize], mut v: usize) -> usize {
+        while leader[v] != v {
+            leader[v] = leader[leader[v]];
+            v = leader[v];
+        }
+        v
+    }
+    for &[a, b, c] in triangles {
+        for other in [b, c] {
+            let (one, two) = (find(&mut leader, a as usize), find(&mut leader, other as usize));
+            leader[one] = two;
+        }
+    }
+    let mut parts: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, t) in triangles.iter().enumerate() {
+        parts.entry(find(&mut leader, t[0] as usize)).or_default().push(i);
+    }
+    parts.into_values().collect()
+}
+
+/// Signed volume enclosed by some triangles, about their own first corner.
 fn volume(frame: &FrameGeometry, triangles: impl Iterator<Item = usize>) -> f64 {
-    let corner = |i: u32| frame.position(i).as_dvec3();
+    let mut origin = None;
+    let mut corner = |i: u32| {
+        let p = frame.position(i).as_dvec3();
+        p - *origin.get_or_insert(p)
+    };
     triangles
-        .map(|t| frame.indices[t].map(corner))
+        .map(|t| frame.indices[t].map(&mut corner))
         .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
         .sum()
 }
@@ -198,15 +227,20 @@ fn closed_scenes_are_closed_when_posed() {
 }
 
 #[test]
-fn closed_objects_face_outward() {
+fn closed_components_face_outward() {
     for name in builtin::NAMES.iter().filter(|n| **n != "forest") {
         let scene = scene(name);
         let frame = scene.at(0.4);
-        for object in &frame.objects {
-            let range = object.triangles.start as usize..object.triangles.end as usize;
-            let volume = volume(&frame, range);
-            let node = &scene.nodes[object.node as usize].name;
-            assert!(volume > 0.0, "{name}: {node} has volume {volume}");
+        let components = components(&welded(&frame));
+        for triangles in components {
+            let first = triangles[0];
+            let volume = volume(&frame, triangles.into_iter());
+            let object = frame
+                .objects
+                .iter()
+                .find(|o| o.triangles.contains(&(first as u32)));
+            let node = object.map(|o| &scene.nodes[o.node as usize].name);
+            assert!(volume > 0.0, "{name}: a part of {node:?} has volume {volume}");
         }
     }
 }

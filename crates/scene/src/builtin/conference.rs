@@ -227,23 +227,6 @@ fn chair() -> [Surface; 4] {
         let curl = 1.2 * p.x * p.x - 0.16 * share - 0.05 * (share * PI).sin();
         vec3(p.x * narrow, p.y, p.z + quilt + curl - 0.22)
     });
-    let arms = [-1.0, 1.0].map(|side| {
-        let knots = [
-            vec3(side * 0.22, 0.45, 0.14),
-            vec3(side * 0.30, 0.46, 0.16),
-            vec3(side * 0.315, 0.58, 0.17),
-            vec3(side * 0.315, 0.685, 0.12),
-            vec3(side * 0.315, 0.70, -0.06),
-            vec3(side * 0.30, 0.69, -0.22),
-            vec3(side * 0.22, 0.70, -0.27),
-        ];
-        let path = smooth_path(&knots, 5);
-        let radii: Vec<f32> = path
-            .iter()
-            .map(|p| if p.y > 0.66 { 0.025 } else { 0.019 })
-            .collect();
-        tube(&path, &radii, 8)
-    });
     let profile = [
         vec2(0.0, 0.09),
         vec2(0.05, 0.09),
@@ -277,7 +260,28 @@ fn chair() -> [Surface; 4] {
         base.join(&tube(&path, &[0.026, 0.025, 0.023, 0.021, 0.018, 0.015], 8));
         wheels.join(&geosphere(2).warped(|p| turn * (p * vec3(0.032, 0.032, 0.02) + vec3(0.30, 0.031, 0.0))));
     }
-    [Surface::joined([seat, back]), Surface::joined(arms), base, wheels]
+    [Surface::joined([seat, back]), arms(), base, wheels]
+}
+
+/// Both arms of a chair.
+fn arms() -> Surface {
+    Surface::joined([-1.0, 1.0].map(|side| {
+        let knots = [
+            vec3(side * 0.22, 0.45, 0.14),
+            vec3(side * 0.30, 0.46, 0.16),
+            vec3(side * 0.315, 0.58, 0.17),
+            vec3(side * 0.315, 0.685, 0.12),
+            vec3(side * 0.315, 0.70, -0.06),
+            vec3(side * 0.30, 0.69, -0.22),
+            vec3(side * 0.22, 0.70, -0.27),
+        ];
+        let path = smooth_path(&knots, 5);
+        let radii: Vec<f32> = path
+            .iter()
+            .map(|p| if p.y > 0.66 { 0.025 } else { 0.019 })
+            .collect();
+        tube(&path, &radii, 8)
+    }))
 }
 
 /// A long lamp panel and six bowls hanging in a row.

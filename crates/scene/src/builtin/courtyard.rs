@@ -4,7 +4,7 @@
 //! Every part is a closed solid, sunk a little into what carries it. The long side runs along X; the court
 //! measures 17.5 m by 12.5 m inside the columns.
 
-use std::f32::consts::{FRAC_PI_2, PI, TAU};
+use std::f32::consts::{FRAC_PI_2, PI};
 
 use glam::{Affine3A, Quat, Vec2, Vec3, dvec3, vec2, vec3};
 

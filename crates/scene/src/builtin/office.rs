@@ -84,7 +84,7 @@ fn windows_and_door(stage: &mut Stage) {
     let mut bars = Surface::default();
     let mut panes = Surface::default();
     for x in [-1.8, 1.8] {
-        panes.join(&block([x - 1.32, 0.88, -3.14], [x + 1.32, 2.32, -3.10]));
+        panes.join(&block([x - 1.32, 0.88, -3.13], [x + 1.32, 2.32, -3.10]));
         bars.join(&block([x - 0.03, 0.9, -3.15], [x + 0.03, 2.3, -3.04]));
         bars.join(&block([x - 1.3, 1.75, -3.15], [x + 1.3, 1.81, -3.04]));
     }

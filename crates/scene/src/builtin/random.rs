@@ -1,4 +1,4 @@
-//! Seeded randomness: a SplitMix64 generator and lattice noise made from the same mixing function.
+//! Seeded randomness: a `SplitMix64` generator and lattice noise made from the same mixing function.
 //!
 //! Source: Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators", OOPSLA 2014. The same seed
 //! gives the same values on every machine.
