@@ -5,18 +5,34 @@
 //! the primaries of sRGB until the tone map.
 
 mod camera;
+mod casters;
 pub mod compare;
 mod error;
 mod film;
+mod frame;
 pub mod image_io;
+mod options;
+mod plan;
 pub mod shade;
+mod stats;
+mod structures;
 pub mod texture;
+mod tile;
 pub mod tonemap;
 
 pub use camera::CameraFrame;
 pub use compare::{CompareOptions, Comparison, compare};
+pub use casters::CasterRules;
 pub use error::{Error, Result};
 pub use film::{Film, LayerKind, Layers, NO_ID, Sample, TileMut};
+pub use frame::{Progress, RenderedFrame, Renderer};
 pub use image_io::{Picture, read_picture};
+pub use options::{CasterPolicy, RenderOptions};
+pub use plan::{FramePlan, LightPlan};
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
+pub use stats::{FrameStats, StructureStats};
+pub use structures::FrameStructures;
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};
+
+pub use rayward_scene as scene;
+pub use rayward_trace as trace;

@@ -57,3 +57,10 @@ pub enum CasterPolicy {
     /// Back faces of all, as in HM08: wrong shadows where surfaces are open.
     Back,
 }
+
+impl RenderOptions {
+    /// The policy in force: the papers' parameters bring their own.
+    pub(crate) fn casters(&self) -> CasterPolicy {
+        if self.paper { CasterPolicy::Back } else { self.casters }
+    }
+}

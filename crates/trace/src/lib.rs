@@ -35,7 +35,7 @@ pub use bins::Binning;
 pub use eye_grid::{EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use kernel::SimdLevel;
 pub use light_grid::{
-    Casters, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
+    CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };
 pub use accel::{Accel, BuildStats, Count, Counters};
 pub use brute::BruteForce;

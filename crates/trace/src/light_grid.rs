@@ -12,7 +12,7 @@
 //! Casters: where a component is closed and neither the viewer nor the light is inside of it, its
 //! back faces alone cast its whole shadow on everything the viewer can see, because every ray that enters it
 //! leaves it again before it reaches the light. Elsewhere both sides cast. The caller says which, see
-//! [`Casters`].
+//! [`Casts`].
 //!
 //! Layout: 16 bytes a vertex while building; 84 bytes a caster, 4 bytes a reference, 8 bytes a cell. Rebuilt every
 //! frame. Answers: exactly those of [`crate::BruteForce`], see [`crate::exact`].
@@ -58,20 +58,20 @@ pub struct Cone {
     pub half_angle: f64,
 }
 
-/// Which triangles cast shadows.
-#[derive(Clone, Copy, Debug, Default)]
-pub enum Casters<'a> {
-    /// All of them.
+/// Which sides of a triangle cast a shadow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Casts {
+    /// Neither.
+    Nothing,
+    /// The back: it casts if it is turned away from the light, or seen edge-on.
+    Back,
+    /// Both sides.
     #[default]
     Both,
-    /// Of some components only the back faces, as seen from the light; of the others all.
-    BackFaces {
-        /// Component of each triangle.
-        component_of_triangle: &'a [u32],
-        /// Per component, whether its back faces suffice.
-        suffice: &'a [bool],
-    },
 }
+
+/// What each triangle casts.
+pub type CastRule<'r> = &'r (dyn Fn(u32) -> Casts + Sync);
 
 /// A light's grid over one frame's triangles.
 #[derive(Clone, Debug)]
@@ -125,13 +125,13 @@ impl<'a> PointLightGrid<'a> {
     pub fn build(
         light: Light,
         triangles: Triangles<'a>,
-        casters: Casters,
+        rule: CastRule,
         options: LightGridOptions,
         level: SimdLevel,
     ) -> Self {
         let faces = crate::light_views::views(&light, &triangles, options.cone)
             .into_iter()
-            .map(|view| Face::build(view, &light, &triangles, casters, &options, level))
+            .map(|view| Face::build(view, &light, &triangles, rule, &options, level))
             .collect();
         Self { light, triangles, level, faces }
     }
@@ -253,11 +253,11 @@ impl Face {
         view: View,
         light: &Light,
         triangles: &Triangles,
-        casters: Casters,
+        rule: CastRule,
         options: &LightGridOptions,
         level: SimdLevel,
     ) -> Self {
-        let keep = |prim: u32| casts(light, triangles, casters, prim);
+        let keep = |prim: u32| takes_part(light, triangles, rule(prim), prim);
         let resolution = options.resolution.unwrap_or_else(|| automatic_resolution(triangles.len()));
         let resolution = resolution.clamp(1, MAX_RESOLUTION);
         let size = [f64::from(view.width), f64::from(view.height)];
@@ -288,11 +288,12 @@ fn automatic_resolution(triangles: usize) -> u32 {
     (((triangles * 2) as f64).sqrt() as u32).clamp(32, 1024)
 }
 
-/// Whether a triangle takes part, see [`Casters`]; edge-on ones always do.
-fn casts(light: &Light, triangles: &Triangles, casters: Casters, prim: u32) -> bool {
-    let Casters::BackFaces { component_of_triangle, suffice } = casters else { return true };
-    if !suffice[component_of_triangle[prim as usize] as usize] {
-        return true;
+/// Whether a triangle is put into the grid.
+fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, prim: u32) -> bool {
+    match casts {
+        Casts::Nothing => return false,
+        Casts::Both => return true,
+        Casts::Back => {}
     }
     let normal = triangles.normal(prim);
     let towards = light.towards(triangles.corners(prim)[0].as_dvec3());
@@ -321,8 +322,7 @@ fn set_up_all(
             for &prim in prims {
                 lanes.push(prim, triangles.indices[prim as usize].map(|i| &vertices[i as usize]));
             }
-            // Points lie at most one cell outside of a triangle's rectangle.
-            set_up_casters(level, &lanes, Origin::OwnCorner { reach: 2.0 }, &mut edges);
+            set_up_casters(level, &lanes, Origin::OwnCorner, &mut edges);
             for (lane, caster) in casters.iter_mut().enumerate() {
                 *caster = if edges.good & (1 << lane) != 0 {
                     let origin = [lanes.x[0][lane], lanes.y[0][lane]];

@@ -3,7 +3,8 @@
 //! In homogeneous raster coordinates p_i = (x, y, w) the edge functions are n_i = p_j x p_k dotted with
 //! (x, y, 1): no clipping is needed for triangles that reach behind the center of projection. Their sign is
 //! oriented so that every ray that hits (t > 0) sees all three non-negative; that orientation is exact.
-//! Nearness is sum(m_i E_i) / det. Cost: some 150 operations; used for triangles that cross the center's plane,
+//! Nearness is sum(m_i E_i) / det. The raster's origin is moved next to the triangle first, so that products of
+//! coordinates stay small and errors with them. Cost: some 150 operations; used for triangles that cross the center's plane,
 //! lie far outside of the raster or are nearly edge-on, and to bin large ones.
 
 use glam::{DVec3, Vec3};
@@ -13,18 +14,21 @@ use crate::kernel::edges::EdgeRecord;
 use crate::kernel::{NEARNESS_BAND, ROUNDOFF};
 use crate::view::{Arrangement, View};
 
-/// Bound on the relative f64 error of a product of homogeneous coordinates; generous.
+/// Bound on the relative f64 error of a product of two sums of a few terms; generous.
 const PRODUCT_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
 /// Edge functions, nearness plane and their error bounds.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PreciseTriangle {
+    /// Raster point that the rest is relative to.
+    origin: [f64; 2],
     points: [DVec3; 3],
     /// Coefficients (of x, of y, constant); inside is where all are non-negative.
     edges: [DVec3; 3],
-    /// Bound on the error of each edge function anywhere on the raster.
+    /// Bound on the error of each edge function, per unit of |x| + |y| + 1.
     edge_errors: [f64; 3],
     nearness: DVec3,
+    /// As `edge_errors`.
     nearness_error: f64,
     /// Nearness above which a point is not certain to lie in front of the view's start.
     ceiling: f64,
@@ -41,33 +45,41 @@ impl PreciseTriangle {
             return None;
         }
         let homogeneous = corners.map(|c| view.homogeneous(c.as_dvec3()));
-        let points = homogeneous.map(|h| h.p);
+        let origin = raster_point_near(view, homogeneous.map(|h| h.p));
+        let points = homogeneous.map(|h| h.p - DVec3::new(origin[0], origin[1], 0.0) * h.p.z);
         let [p0, p1, p2] = points;
         let edges = [p1.cross(p2) * orientation, p2.cross(p0) * orientation, p0.cross(p1) * orientation];
+
+        // Sizes of the coordinates now, and of those whose rounding they carry.
         let size = points.map(|p| p.abs().element_sum());
-        let extent = f64::from(view.width + view.height + 1);
-        let error = |a: f64, b: f64| PRODUCT_ERROR * a * b * extent;
-        let edge_errors = [error(size[1], size[2]), error(size[2], size[0]), error(size[0], size[1])];
+        let scale = view.scale_x.abs().max(view.scale_y.abs());
+        let spans = corners.map(|c| (c.as_dvec3() - view.center.as_dvec3()).length() * scale);
+        let carried: [f64; 3] = std::array::from_fn(|i| homogeneous[i].p.abs().element_sum() + spans[i]);
+        let error = |j: usize, k: usize| {
+            PRODUCT_ERROR * (size[j] * size[k] + (carried[j] * size[k] + size[j] * carried[k]) / 8.0)
+        };
+        let edge_errors = [error(1, 2), error(2, 0), error(0, 1)];
         let det = p0.dot(edges[0]).max(f64::MIN_POSITIVE);
-        let det_error = PRODUCT_ERROR * size[0] * size[1] * size[2] / det;
+        let det_error = (size[0] * edge_errors[0] + PRODUCT_ERROR * carried[0] * size[1] * size[2]) / det;
         let m = homogeneous.map(|h| h.m);
         let nearness = (edges[0] * m[0] + edges[1] * m[1] + edges[2] * m[2]) / det;
         let sum_error: f64 = (0..3).map(|i| m[i].abs() * edge_errors[i]).sum::<f64>() / det;
-        let largest = nearness.abs().dot(DVec3::new(extent, extent, 1.0));
+        let nearness_error = sum_error + nearness.abs().max_element() * det_error;
         let ceiling = match view.arrangement {
             Arrangement::Perspective => f64::INFINITY,
             Arrangement::Parallel { reach } => reach * (1.0 - f64::from(NEARNESS_BAND)),
         };
-        let nearness_error = sum_error + largest * det_error;
-        Some(Self { points, edges, edge_errors, nearness, nearness_error, ceiling })
+        Some(Self { origin, points, edges, edge_errors, nearness, nearness_error, ceiling })
     }
 
     /// Whether some ray of the raster rectangle may hit; never wrong when it says no.
     pub(crate) fn overlaps(&self, min: [f64; 2], max: [f64; 2]) -> bool {
+        let relative = |v: [f64; 2]| [v[0] - self.origin[0], v[1] - self.origin[1]];
+        let (min, max) = (relative(min), relative(max));
         self.edges.iter().zip(self.edge_errors).all(|(e, error)| {
             let x = if e.x > 0.0 { max[0] } else { min[0] };
             let y = if e.y > 0.0 { max[1] } else { min[1] };
-            e.x * x + e.y * y + e.z >= -error
+            e.x * x + e.y * y + e.z >= -error * (x.abs() + y.abs() + 1.0)
         })
     }
 
@@ -77,11 +89,12 @@ impl PreciseTriangle {
     /// near zero occurs unless the triangle passes through the center itself.
     pub(crate) fn bounds(&self, view: &View) -> Option<[[f64; 2]; 2]> {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
+        let [ox, oy] = self.origin;
         let planes = [
-            DVec3::X,
-            DVec3::Y,
-            DVec3::new(-1.0, 0.0, width),
-            DVec3::new(0.0, -1.0, height),
+            DVec3::new(1.0, 0.0, ox),
+            DVec3::new(0.0, 1.0, oy),
+            DVec3::new(-1.0, 0.0, width - ox),
+            DVec3::new(0.0, -1.0, height - oy),
         ];
         let mut polygon: Vec<DVec3> = self.points.to_vec();
         for plane in planes {
@@ -93,7 +106,7 @@ impl PreciseTriangle {
         let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in polygon {
             // Inside the pyramid only its tip has no depth; there the triangle may cover everything.
-            let [x, y] = [p.x / p.z, p.y / p.z];
+            let [x, y] = [p.x / p.z + ox, p.y / p.z + oy];
             if !(x.is_finite() && y.is_finite()) {
                 return Some([[0.0, 0.0], [width, height]]);
             }
@@ -106,22 +119,33 @@ impl PreciseTriangle {
 
     /// The triangle as the kernels take it, relative to raster point `origin` and for use within `reach` of it.
     pub(crate) fn record(&self, prim: u32, origin: [f64; 2], reach: f64) -> EdgeRecord {
-        let at_origin = |p: DVec3| DVec3::new(p.x, p.y, p.x * origin[0] + p.y * origin[1] + p.z);
-        let rounding = |p: DVec3| 8.0 * f64::from(ROUNDOFF) * (p.x.abs() * reach + p.y.abs() * reach + p.z.abs());
+        let [x, y] = [origin[0] - self.origin[0], origin[1] - self.origin[1]];
+        let extent = x.abs() + y.abs() + 2.0 * reach + 1.0;
+        let at_origin = |p: DVec3| DVec3::new(p.x, p.y, p.x * x + p.y * y + p.z);
+        let rounding = |p: DVec3| 8.0 * f64::from(ROUNDOFF) * ((p.x.abs() + p.y.abs()) * reach + p.z.abs());
         let mut record = EdgeRecord { prim, ..EdgeRecord::default() };
         for i in 0..3 {
             let edge = at_origin(self.edges[i]);
-            let scale = 1.0 / (1.01 * (self.edge_errors[i] + rounding(edge)));
-            let edge = edge * scale;
+            let edge = edge / (1.01 * (self.edge_errors[i] * extent + rounding(edge)));
             (record.a[i], record.b[i], record.c[i]) = (edge.x as f32, edge.y as f32, edge.z as f32);
         }
         let plane = at_origin(self.nearness);
         (record.nearness_x, record.nearness_y, record.nearness) =
             (plane.x as f32, plane.y as f32, plane.z as f32);
-        record.floor = ((self.nearness_error + rounding(plane)) * 4.0 / f64::from(NEARNESS_BAND)) as f32;
+        let error = self.nearness_error * extent + rounding(plane);
+        record.floor = (error * 4.0 / f64::from(NEARNESS_BAND)) as f32;
         record.ceiling = self.ceiling as f32;
         record
     }
+}
+
+/// A raster point close to the triangle: where its first corner in front lies, kept to the raster.
+fn raster_point_near(view: &View, points: [DVec3; 3]) -> [f64; 2] {
+    let front = points.iter().find(|p| p.z > 0.0);
+    front.map_or(view.middle, |p| {
+        let limit = |v: f64, size: u32| v.clamp(0.0, f64::from(size)).round();
+        [limit(p.x / p.z, view.width), limit(p.y / p.z, view.height)]
+    })
 }
 
 /// Exact sign of the edge functions inside the triangle: which way round it lies in the raster.

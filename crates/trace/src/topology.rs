@@ -379,3 +379,26 @@ fn grouped(component_of_triangle: &[u32], components: &[Component]) -> (Vec<u32>
     }
     (order, starts)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_direction_through_an_edge_or_a_vertex_does_not_count() {
+        let (x, y) = ([1.0, -1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0, 0.0, 0.0]);
+        let z = [0.0, 0.0, 0.0, 0.0, 1.0, -1.0];
+        let upper = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4]];
+        let lower = upper.map(|[a, b, _]| [b, a, 5]);
+        let indices = [upper, lower].concat();
+        let octahedron = Triangles::new(&x, &y, &z, &indices);
+        let list: Vec<u32> = (0..8).collect();
+        let from_centre = |dir| crossings(&octahedron, &list, DVec3::ZERO, dir);
+        assert_eq!(from_centre(DVec3::X), None);
+        assert_eq!(from_centre(DVec3::new(1.0, 1.0, 0.0)), None);
+        assert_eq!(from_centre(DVec3::new(3.0, 2.0, 1.0)), Some(1));
+        let topology = Topology::analyse(&octahedron);
+        assert!(topology.components.len() == 1 && topology.components[0].closed);
+        assert_eq!(topology.winding_number(&octahedron, 0, DVec3::ZERO), 1);
+    }
+}

@@ -119,9 +119,12 @@ impl EdgeLanes {
 pub(crate) enum Origin {
     /// One point for all, evaluated up to `reach` away from it on either axis.
     Point { x: f32, y: f32, reach: f32 },
-    /// Each triangle's own corner 0, evaluated up to `reach` outside of its bounding rectangle.
-    OwnCorner { reach: f32 },
+    /// Each triangle's own corner 0.
+    OwnCorner,
 }
+
+/// How far outside of a triangle's bounding rectangle its record is evaluated at most, on either axis.
+const MARGIN: f32 = 4.0;
 
 /// Sets up all lanes.
 #[inline(always)]
@@ -139,7 +142,7 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mu
     let eps = largest * splat(1.05 * ROUNDOFF);
     let (ox, oy, reach) = match origin {
         Origin::Point { x, y, reach } => (splat(x), splat(y), splat(reach)),
-        Origin::OwnCorner { reach } => (x[0], y[0], splat(reach)),
+        Origin::OwnCorner => (x[0], y[0], splat(MARGIN)),
     };
 
     let (x01, y01) = (x[1] - x[0], y[1] - y[0]);
@@ -148,12 +151,13 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mu
     let area_error = eps * splat(4.0) * (w + h) + splat(8.0 * ROUNDOFF) * w * h;
     let orientation = splat(1.0).copysign(area);
 
-    // How far, at most, an evaluated point and the origin lie from any vertex.
+    // How far, at most, an evaluated point lies from any vertex, and how far the origin from either.
+    let (near_x, near_y) = (w + splat(MARGIN), h + splat(MARGIN));
     let (far_x, far_y) = (w + reach, h + reach);
     for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
         let (ex, ey) = (x[k] - x[j], y[k] - y[j]);
         let (ax, ay) = (ex.abs(), ey.abs());
-        let bound = eps * (splat(2.0) * (far_x + far_y) + splat(2.0) * (ax + ay))
+        let bound = eps * splat(2.0) * (near_x + near_y + ax + ay)
             + splat(12.0 * ROUNDOFF) * (ax * far_y + ay * far_x);
         let scale = orientation / (bound * splat(1.02) + splat(f32::MIN_POSITIVE));
         let constant = ex * (oy - y[j]) - ey * (ox - x[j]);
@@ -173,7 +177,6 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mu
     // Error of n inside the triangle: of the differences, of the area, of the raster point, of the evaluation.
     let n_min = n[0].min(n[1]).min(n[2]);
     let n_max = n[0].max(n[1]).max(n[2]);
-    let slope = gx.abs() * w + gy.abs() * h;
     let shift = (gx.abs() + gy.abs()) * eps * splat(2.0);
     let spread = n01.abs().max(n02.abs());
     let inverse = inverse.abs();
@@ -181,7 +184,8 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mu
         * (w * h * splat(4.0 * ROUNDOFF) * (n_max * splat(2.0) + spread * splat(4.0))
             + eps * spread * splat(4.0) * (w + h));
     let evaluation = splat(6.0 * ROUNDOFF) * (n_max + gx.abs() * far_x + gy.abs() * far_y);
-    let error = differences + slope * inverse * area_error + shift + evaluation;
+    // The area divides both slopes alike, so its error scales n(q) - n0 as a whole.
+    let error = differences + spread * inverse * area_error + shift + evaluation;
 
     let good = area.abs().simd_gt(area_error * splat(2.0))
         & error.simd_lt(n_min * splat(NEARNESS_BAND * 0.25))

@@ -22,7 +22,7 @@ fn receivers(mesh: &Mesh, eye: Vec3, count: usize, seed: u64) -> Vec<Receiver> {
     found
 }
 
-fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, casters: Casters) -> ShadowCounts {
+fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: CastRule) -> ShadowCounts {
     let triangles = mesh.triangles();
     let in_shadow = |r: &Receiver| {
         (0..triangles.len() as u32).any(|prim| {
@@ -33,7 +33,7 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, casters:
     let mut counts = ShadowCounts::default();
     for level in SimdLevel::available() {
         for options in [LightGridOptions::default(), LightGridOptions::paper()] {
-            let grid = PointLightGrid::build(light, triangles, casters, options, level);
+            let grid = PointLightGrid::build(light, triangles, rule, options, level);
             let mut scratch = ShadowScratch::default();
             let mut shadow = Vec::new();
             grid.shadowed(receivers, &mut scratch, &mut shadow);
@@ -68,7 +68,7 @@ fn equals_brute_force_with_casters_of_both_sides() {
         for eye in [eye, Vec3::new(0.1, 0.05, 0.0)] {
             let receivers = receivers(&mesh, eye, 400, 11);
             for light in lights() {
-                check(name, &mesh, &receivers, light, Casters::Both);
+                check(name, &mesh, &receivers, light, &|_| Casts::Both);
             }
         }
     }
@@ -82,7 +82,7 @@ fn equals_brute_force_at_any_scale_and_offset() {
         let receivers = receivers(&mesh, Vec3::new(0.2, 0.5, 2.5) * scale + offset, 300, 5);
         for position in [Vec3::new(2.0, 3.0, 1.0), Vec3::new(0.1, 0.1, 0.0)] {
             let light = Light::Point(position * scale + offset);
-            check(&format!("scale {scale} offset {offset}"), &mesh, &receivers, light, Casters::Both);
+            check(&format!("scale {scale} offset {offset}"), &mesh, &receivers, light, &|_| Casts::Both);
         }
     }
 }
@@ -92,8 +92,6 @@ fn back_faces_suffice_for_what_an_outside_viewer_sees() {
     let mesh = Mesh::blob(24);
     let triangles = mesh.triangles();
     let eye = Vec3::new(0.2, 0.5, 2.5);
-    let component_of_triangle = vec![0; triangles.len()];
-    let casters = Casters::BackFaces { component_of_triangle: &component_of_triangle, suffice: &[true] };
     for light in lights().into_iter().filter(|l| *l != Light::Point(Vec3::new(0.05, 0.02, -0.03))) {
         // Receivers on the side turned away from the light are dark without a ray, so nobody asks about them.
         let mut receivers = receivers(&mesh, eye, 3000, 17);
@@ -106,7 +104,7 @@ fn back_faces_suffice_for_what_an_outside_viewer_sees() {
         });
         let inside = matches!(light, Light::Point(p) if p.length() < 1.1);
         if !inside {
-            let counts = check("blob", &mesh, &receivers, light, casters);
+            let counts = check("blob", &mesh, &receivers, light, &|_| Casts::Back);
             assert!(counts.receivers > 100, "too few receivers to mean anything: {counts:?}");
         }
     }
@@ -131,7 +129,7 @@ fn a_convex_surface_never_shadows_its_lit_side() {
         let grid = PointLightGrid::build(
             light,
             triangles,
-            Casters::Both,
+            &|_| Casts::Both,
             LightGridOptions::default(),
             SimdLevel::detect(),
         );
@@ -152,7 +150,7 @@ fn a_spot_lights_cone_is_one_face() {
     receivers.retain(|r| (r.point - position.as_dvec3()).angle_between(axis) < 0.5);
     let light = Light::Point(position);
     let options = LightGridOptions { cone: Some(cone), ..LightGridOptions::default() };
-    let grid = PointLightGrid::build(light, triangles, Casters::Both, options, SimdLevel::detect());
+    let grid = PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
     assert_eq!(grid.faces.len(), 1);
     let mut shadow = Vec::new();
     grid.shadowed(&receivers, &mut ShadowScratch::default(), &mut shadow);
@@ -167,10 +165,10 @@ fn nothing_and_nonsense_shadow_nothing() {
     let mesh = Mesh::default();
     let receivers = [Receiver::free(DVec3::ZERO), Receiver::free(DVec3::NAN)];
     for light in lights() {
-        check("empty", &mesh, &receivers, light, Casters::Both);
+        check("empty", &mesh, &receivers, light, &|_| Casts::Both);
     }
     let soup = Mesh::soup(1, 20, 0.3, 1.0);
     for light in [Light::Point(Vec3::NAN), Light::Directional(Vec3::ZERO), Light::Directional(Vec3::NAN)] {
-        check("nonsense", &soup, &receivers, light, Casters::Both);
+        check("nonsense", &soup, &receivers, light, &|_| Casts::Both);
     }
 }

@@ -1,0 +1,101 @@
+//! Which triangles cast shadows from which side.
+//!
+//! HM08 §5.2 draws the back faces of models that are assumed to be closed. Here closedness is found out
+//! ([`Topology`]), and the rule is applied to the components where it cannot change an answer: closed, opaque,
+//! and neither the eye nor the light inside. Every ray from what the eye sees to the light then leaves such a
+//! component as often as it enters it.
+
+use glam::DVec3;
+use rayward_scene::{AlphaMode, FrameGeometry, Scene};
+use rayward_trace::{Casts, Light, Topology, Triangles};
+
+use crate::CasterPolicy;
+
+/// Per component, whether the eye is outside; per triangle, whether it is opaque.
+#[derive(Clone, Debug)]
+pub struct CasterRules<'t> {
+    topology: &'t Topology,
+    policy: CasterPolicy,
+    candidates: Vec<bool>,
+    transparent: Vec<bool>,
+}
+
+impl<'t> CasterRules<'t> {
+    /// The rules for an eye at this point of the local frame; `None` for a parallel camera, which has no one
+    /// point to be inside of anything.
+    pub fn new(
+        scene: &Scene,
+        geometry: &FrameGeometry,
+        topology: &'t Topology,
+        policy: CasterPolicy,
+        eye: Option<DVec3>,
+    ) -> Self {
+        let triangles = triangles(geometry);
+        let transparent = transparent_triangles(scene, geometry);
+        let mut candidates: Vec<bool> = (0..topology.components.len() as u32)
+            .map(|c| {
+                let closed = topology.components[c as usize].closed;
+                closed && eye.is_some_and(|eye| topology.winding_number(&triangles, c, eye) == 0)
+            })
+            .collect();
+        for (component, transparent) in topology.component_of_triangle.iter().zip(&transparent) {
+            if let Some(candidate) = candidates.get_mut(*component as usize) {
+                *candidate &= !transparent;
+            }
+        }
+        Self { topology, policy, candidates, transparent }
+    }
+
+    /// Whether a triangle lets light through, so that grids leave it to the hierarchy.
+    pub fn is_transparent(&self, prim: u32) -> bool {
+        self.transparent.get(prim as usize).copied().unwrap_or(false)
+    }
+
+    /// Whether there is any such triangle.
+    pub fn any_transparent(&self) -> bool {
+        !self.transparent.is_empty()
+    }
+
+    /// What each triangle casts in this light.
+    pub fn for_light(&self, geometry: &FrameGeometry, light: &Light) -> impl Fn(u32) -> Casts + Sync {
+        let triangles = triangles(geometry);
+        let back_faces_suffice: Vec<bool> = (0..self.candidates.len() as u32)
+            .map(|c| {
+                self.candidates[c as usize]
+                    && match *light {
+                        Light::Directional(_) => true,
+                        Light::Point(p) => {
+                            self.topology.winding_number(&triangles, c, p.as_dvec3()) == 0
+                        }
+                    }
+            })
+            .collect();
+        move |prim| {
+            if self.is_transparent(prim) {
+                return Casts::Nothing;
+            }
+            let component = self.topology.component_of_triangle[prim as usize] as usize;
+            match self.policy {
+                CasterPolicy::Both => Casts::Both,
+                CasterPolicy::Back => Casts::Back,
+                CasterPolicy::Auto if back_faces_suffice.get(component) == Some(&true) => Casts::Back,
+                CasterPolicy::Auto => Casts::Both,
+            }
+        }
+    }
+}
+
+/// The frame's triangles as the structures take them.
+pub(crate) fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
+    Triangles { x: &geometry.x, y: &geometry.y, z: &geometry.z, indices: &geometry.indices }
+}
+
+/// Per triangle, whether its material is masked or blended; empty if none is.
+fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
+    let transparent = |material: u32| scene.materials[material as usize].alpha_mode != AlphaMode::Opaque;
+    if !geometry.objects.iter().any(|o| transparent(o.material)) {
+        return Vec::new();
+    }
+    let objects = geometry.objects.iter();
+    objects.flat_map(|o| std::iter::repeat_n(transparent(o.material), o.triangles.len())).collect()
+}

@@ -1,0 +1,146 @@
+//! One frame, in the papers' order: plan, structures, tiles, image.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
+use rayward_trace::{Topology, View};
+
+use crate::casters::{CasterRules, triangles};
+use crate::plan::FramePlan;
+use crate::structures::FrameStructures;
+use crate::tile::{TileCounts, TileShader, TileWork};
+use crate::{CameraFrame, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
+
+/// Renders frames of one scene. Keeps what outlives a frame: materials, textures and the topology.
+#[derive(Debug)]
+pub struct Renderer<'s> {
+    scene: &'s Scene,
+    shader: Shader<'s>,
+    topology: Option<(Vec<[u32; 3]>, Topology)>,
+}
+
+/// A rendered frame.
+#[derive(Clone, Debug)]
+pub struct RenderedFrame {
+    /// The picture and its layers.
+    pub film: Film,
+    /// What it cost.
+    pub stats: FrameStats,
+}
+
+/// How far a frame has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Tiles done.
+    pub done: u64,
+    /// Tiles of the frame.
+    pub total: u64,
+}
+
+impl<'s> Renderer<'s> {
+    /// A renderer for this scene; prepares its materials and textures.
+    pub fn new(scene: &'s Scene) -> Self {
+        Self { scene, shader: Shader::new(scene), topology: None }
+    }
+
+    /// Renders one frame on the threads of the current rayon pool. The picture is the same for any number of
+    /// threads and any instruction set. `progress` is told after each tile, from any thread.
+    ///
+    /// # Errors
+    /// [`crate::Error::ImageSize`] and [`crate::Error::Camera`].
+    ///
+    /// # Panics
+    /// If the geometry is not of the renderer's scene.
+    pub fn render(
+        &mut self,
+        geometry: &FrameGeometry,
+        camera: &PosedCamera,
+        lights: &[PosedLight],
+        options: &RenderOptions,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<RenderedFrame> {
+        let camera = CameraFrame::new(camera, geometry.origin, options.width, options.height)?;
+        let mut film = Film::new(options.width, options.height, options.layers)?;
+        let view = view(&camera, geometry);
+        let start = Instant::now();
+        self.update_topology(geometry);
+        let topology = &self.topology.as_ref().expect("just updated").1;
+        let eye = (!camera.orthographic).then(|| camera.eye.as_dvec3());
+        let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
+
+        let plan = FramePlan::new(geometry, lights, options);
+        let structures = FrameStructures::build(&plan, view, geometry, &rules, options);
+        let build = start.elapsed();
+
+        let start = Instant::now();
+        let shading_lights: Vec<_> = lights.iter().map(|l| ShadingLight::new(l, geometry.origin)).collect();
+        let shader = TileShader {
+            shader: &self.shader,
+            geometry,
+            camera: &camera,
+            lights: &shading_lights,
+            ends: &plan.lights,
+            structures: &structures,
+            rules: &rules,
+            options,
+        };
+        let side = structures.eye.tile(0).width.max(structures.eye.tile(0).height);
+        let mut tiles = film.tiles_mut(side, side);
+        let (done, total) = (AtomicU64::new(0), tiles.len() as u64);
+        let counts = tiles
+            .par_iter_mut()
+            .enumerate()
+            .map_init(TileWork::default, |work, (index, out)| {
+                let counts = shader.render(index as u32, work, out);
+                progress(Progress { done: done.fetch_add(1, Ordering::Relaxed) + 1, total });
+                counts
+            })
+            .reduce(TileCounts::default, TileCounts::sum);
+        drop(tiles);
+
+        let stats = FrameStats {
+            triangles: geometry.triangle_count(),
+            dropped_non_finite: geometry.dropped_non_finite,
+            dropped_degenerate: geometry.dropped_degenerate,
+            structures: structures.stats,
+            eye_rays: u64::from(options.width) * u64::from(options.height),
+            shadow_rays: counts.shadow_rays,
+            exact_pixels: counts.exact_pixels,
+            lit_by_cell: counts.lit_by_cell,
+            build,
+            trace: start.elapsed(),
+        };
+        Ok(RenderedFrame { film, stats })
+    }
+
+    /// Finds the components anew only where the triangles are others than in the last frame.
+    fn update_topology(&mut self, geometry: &FrameGeometry) {
+        let triangles = triangles(geometry);
+        match &mut self.topology {
+            Some((indices, topology)) if *indices == geometry.indices => topology.update(&triangles),
+            other => *other = Some((geometry.indices.clone(), Topology::analyse(&triangles))),
+        }
+    }
+}
+
+/// The camera's rays as the structures know them.
+fn view(camera: &CameraFrame, geometry: &FrameGeometry) -> View {
+    let axes = [camera.right, camera.up, camera.forward];
+    let size = [camera.width, camera.height];
+    let half = [
+        camera.step_x.length() * 0.5 * f64::from(camera.width),
+        camera.step_y.length() * 0.5 * f64::from(camera.height),
+    ];
+    if !camera.orthographic {
+        return View::perspective(camera.eye, axes, half, size);
+    }
+    let farthest = geometry.bounds().map_or(1.0, |(low, high)| {
+        let eye = camera.eye.as_dvec3();
+        let corner = |p: glam::Vec3| -> DVec3 { (p.as_dvec3() - eye).abs() };
+        corner(low).max(corner(high)).length()
+    });
+    View::parallel(camera.eye, axes, half, 4.0 * farthest + 1.0, size)
+}
