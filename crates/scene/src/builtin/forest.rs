@@ -20,6 +20,9 @@ use crate::{Material, Scene, Transform};
 const TRIANGLES: usize = 174_000;
 const SECONDS: f32 = 4.0;
 const BLADES: usize = 44;
+/// Where the hares are at the start, X and Z.
+const SITTING: Vec2 = vec2(-1.35, 2.3);
+const HOPPING: Vec2 = vec2(2.6, 2.2);
 
 /// The whole scene.
 pub(super) fn forest() -> Scene {
@@ -135,6 +138,9 @@ fn mushrooms(stage: &mut Stage, random: &mut Random) {
         let turn = i as f32 / 22.0 * TAU + random.between(-0.1, 0.1);
         let at = vec2(turn.cos(), turn.sin()) * random.between(2.6, 3.8);
         let size = random.between(0.16, 0.42);
+        if [SITTING, HOPPING].iter().any(|hare| hare.distance(at) < 0.9) {
+            continue;
+        }
         stage.place("mushroom", kinds[i % 2], None, placed(on_ground(at), turn, size));
     }
 }
@@ -145,11 +151,7 @@ fn hares(stage: &mut Stage, animation: usize) {
     let pale = stage.matte("grey fur", [0.50, 0.46, 0.42], 1.0);
     for (name, color, frequency) in [("sitting hare", fur, 22), ("hopping hare", pale, 14)] {
         let mesh = stage.mesh("hare", vec![hare(frequency).into_smooth_primitive(color)]);
-        let start = if color == fur {
-            vec2(-1.35, 2.3)
-        } else {
-            vec2(2.6, 2.2)
-        };
+        let start = if color == fur { SITTING } else { HOPPING };
         let yaw = if color == fur { 0.5 } else { -1.9 };
         let node = stage.place(name, mesh, None, placed(on_ground(start), yaw, 0.62));
         if color == pale {
@@ -181,11 +183,13 @@ fn butterflies(stage: &mut Stage, animation: usize, random: &mut Random) {
         let color = [[0.75, 0.45, 0.05], [0.12, 0.30, 0.75], [0.80, 0.75, 0.60]][i % 3];
         let paint = double_sided(stage, "butterfly wing", color);
         let wing = stage.mesh("butterfly wing", vec![wing().into_primitive(60.0, paint)]);
-        let home = vec3(
-            random.between(-2.2, 2.2),
-            random.between(0.7, 2.2),
-            random.between(-0.5, 3.2),
-        );
+        // On both sides of the fairy's way.
+        let aside = if i % 2 == 0 {
+            random.between(0.9, 2.3)
+        } else {
+            random.between(-2.8, -2.0)
+        };
+        let home = vec3(aside, random.between(0.7, 2.0), random.between(-0.5, 3.0));
         let (start, radius) = (random.unit(), random.between(0.25, 0.6));
         let node = stage.place("butterfly", body, None, placed(home, 0.0, 1.1));
         let (times, flight) = sampled(SECONDS, 48, |phase| {
