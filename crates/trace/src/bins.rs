@@ -133,10 +133,12 @@ impl Chunk {
     }
 }
 
+/// Raster points and vertices below the guard are known to 1/512 of a unit or better; a cell's triangles are those
+/// that come this close to it.
+const SLACK: f32 = 1.0 / 64.0;
+
 /// Inclusive cell rectangle of raster bounds; `None` if it holds nothing that matters.
 fn cell_rect(grid: &CellGrid, min: [f32; 2], max: [f32; 2]) -> Option<[[u32; 2]; 2]> {
-    // Coordinates below the guard are known to 1/512 or better.
-    const SLACK: f32 = 1.0 / 64.0;
     let mut rect = [[0; 2]; 2];
     for axis in 0..2 {
         let (mut low, mut high) = (min[axis] - SLACK, max[axis] + SLACK);
@@ -168,9 +170,12 @@ fn bin(
     pairs: &mut Vec<(u32, u32)>,
 ) {
     let corners = triangles.indices[prim as usize].map(|i| &vertices[i as usize]);
-    let usable = corners.iter().all(|v| v.nearness > 0.0);
+    if corners.iter().all(|v| v.nearness < 0.0) {
+        return;
+    }
+    let ahead = corners.iter().all(|v| v.nearness >= 0.0);
     let mut precise = None;
-    let rect = if usable {
+    let rect = if ahead {
         let [a, b, c] = corners;
         let min = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y)];
         let max = [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y)];
@@ -192,11 +197,12 @@ fn bin(
     let Some(precise) = precise.or_else(|| PreciseTriangle::new(view, triangles.corners(prim))) else { return };
     let side = f64::from(grid.side);
     for y in y0..=y1 {
-        for x in x0..=x1 {
-            let min = [f64::from(x) * side, f64::from(y) * side];
-            if precise.overlaps(min, min.map(|v| v + side)) {
-                pairs.push((y * columns + x, prim));
-            }
+        let (top, slack) = (f64::from(y) * side, f64::from(SLACK));
+        let Some([from, to]) = precise.row_span(top - slack, top + side + slack) else { continue };
+        let (from, to) = ((from - slack) / side, (to + slack) / side);
+        let column = |x: f64| x.clamp(f64::from(x0), f64::from(x1)) as u32;
+        if to >= f64::from(x0) && from <= f64::from(x1 + 1) {
+            pairs.extend((column(from)..=column(to)).map(|x| (y * columns + x, prim)));
         }
     }
 }

@@ -72,15 +72,27 @@ impl PreciseTriangle {
         Some(Self { origin, points, edges, edge_errors, nearness, nearness_error, ceiling })
     }
 
-    /// Whether some ray of the raster rectangle may hit; never wrong when it says no.
-    pub(crate) fn overlaps(&self, min: [f64; 2], max: [f64; 2]) -> bool {
-        let relative = |v: [f64; 2]| [v[0] - self.origin[0], v[1] - self.origin[1]];
-        let (min, max) = (relative(min), relative(max));
-        self.edges.iter().zip(self.edge_errors).all(|(e, error)| {
-            let x = if e.x > 0.0 { max[0] } else { min[0] };
-            let y = if e.y > 0.0 { max[1] } else { min[1] };
-            e.x * x + e.y * y + e.z >= -error * (x.abs() + y.abs() + 1.0)
-        })
+    /// The range of x in which rays with y from `top` to `bottom` may hit; never too small. `None` if none may.
+    pub(crate) fn row_span(&self, top: f64, bottom: f64) -> Option<[f64; 2]> {
+        let (top, bottom) = (top - self.origin[1], bottom - self.origin[1]);
+        let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (edge, error) in self.edges.iter().zip(self.edge_errors) {
+            // Over the row, e(x, y) + error (|x| + |y| + 1) is at most rest + edge.x x + error |x|.
+            let y = if edge.y > 0.0 { bottom } else { top };
+            let rest = edge.y * y + edge.z + error * (y.abs() + 1.0);
+            if edge.x.abs() <= 2.0 * error {
+                continue;
+            }
+            // Where edge.x dominates, x beyond the root by its error's share cannot be inside.
+            let root = -rest / edge.x;
+            let slack = root.abs() * (2.0 * error / edge.x.abs()) + root.abs() * 1e-12;
+            if edge.x > 0.0 {
+                from = from.max(root - slack);
+            } else {
+                to = to.min(root + slack);
+            }
+        }
+        (from <= to).then(|| [from + self.origin[0], to + self.origin[0]])
     }
 
     /// Raster rectangle (min, max) that holds all of the triangle that the view sees; `None` if nothing.

@@ -9,8 +9,11 @@ use super::{LANES, SimdLevel};
 use crate::Triangles;
 use crate::view::{Arrangement, View};
 
-/// A projected vertex: raster x and y and nearness. `nearness` is negative where the projection is not
-/// usable: at or behind the center of projection, or far outside of the raster.
+/// A projected vertex: raster x and y and nearness.
+///
+/// `nearness` tells what it is good for: above 0, everything; 0, it lies in front but so far outside of the
+/// raster that only the order of coordinates means anything; below 0, it lies behind the view's start; not a
+/// number, nothing is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub(crate) struct RasterVertex {
@@ -20,7 +23,7 @@ pub(crate) struct RasterVertex {
     padding: f32,
 }
 
-/// Raster coordinates beyond this count as unusable; below, f32 resolves 1/512 of a unit.
+/// Raster coordinates beyond this are far outside; below, f32 resolves 1/512 of a unit.
 const GUARD: f32 = 16384.0;
 
 /// Projects vertices `first..first + out.len()`.
@@ -70,8 +73,12 @@ pub(crate) fn project_lanes<S: Simd>(simd: S, view: &View, points: [f32x16<S>; 3
     let y = low[1].narrow(high[1]);
     let nearness = low[2].narrow(high[2]);
     let guard = f32x16::splat(simd, GUARD);
-    let usable = x.abs().simd_lt(guard) & y.abs().simd_lt(guard) & nearness.is_finite();
-    [x, y, usable.select(nearness, f32x16::splat(simd, -1.0))]
+    let zero = f32x16::splat(simd, 0.0);
+    let inside = x.abs().simd_lt(guard) & y.abs().simd_lt(guard);
+    let ahead = nearness.simd_gt(zero);
+    let known = x.simd_eq(x) & y.simd_eq(y) & nearness.is_finite();
+    let marked = (ahead & !inside).select(zero, nearness);
+    [x, y, known.select(marked, f32x16::splat(simd, f32::NAN))]
 }
 
 #[inline(always)]
