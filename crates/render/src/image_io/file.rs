@@ -59,3 +59,28 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
     fs::read(path).map_err(|source| Error::read(path, source))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_what_was_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let failing = |sink: &mut dyn Sink| {
+            sink.write_all(&[7; 100_000])?;
+            Err(io::Error::other("the disk is full"))
+        };
+        assert!(matches!(write(&path, failing), Err(Error::Write { .. })));
+        assert!(!path.exists());
+        write(&path, |sink| sink.write_all(b"whole")).unwrap();
+        assert!(matches!(write(&path, failing), Err(Error::Write { .. })));
+        assert_eq!(fs::read(&path).unwrap(), b"whole");
+        assert_eq!(
+            fs::read_dir(folder.path()).unwrap().count(),
+            1,
+            "no temporary file is left"
+        );
+    }
+}

@@ -9,7 +9,7 @@
 //! Area lights stand for a point light at their centre here. Transmission is not shaded: glass looks like the
 //! diffuse base it is coated on.
 //!
-//! Cost: no allocation, no dynamic calls; some 100 ns a surface without textures and 30 ns a light.
+//! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
 
 pub mod brdf;
 mod light;

@@ -104,6 +104,10 @@ fn wrapping_continues_the_image() {
         assert!((at(Wrap::MirroredRepeat, u) - at(Wrap::MirroredRepeat, 2.0 - u)).abs() < 1e-4);
         assert!((at(Wrap::MirroredRepeat, u) - at(Wrap::Repeat, u)).abs() < 1e-4);
     }
+    // A quarter of a texel before the right border: three quarters of the last texel and one of the first.
+    let near_border = 1.0 - 0.25 / 8.0;
+    assert!((at(Wrap::Repeat, near_border) - 0.75 * 7.0).abs() < 1e-4);
+    assert!((at(Wrap::ClampToEdge, near_border) - 7.0).abs() < 1e-4);
     assert!(at(Wrap::MirroredRepeat, 1.0) > 6.9 && at(Wrap::MirroredRepeat, 0.0) < 0.1);
 }
 
