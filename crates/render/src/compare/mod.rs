@@ -3,7 +3,7 @@
 //! Values are compared as they are in the files: sRGB encoded ones as displayed, linear ones as they are. If only
 //! one of the images is encoded, the other is encoded as well. FLIP always sees displayed values.
 //!
-//! Cost: some 1.5 microseconds a pixel and core, nearly all of it FLIP.
+//! Cost: some 1 microsecond a pixel and core, nearly all of it FLIP.
 
 mod flip;
 

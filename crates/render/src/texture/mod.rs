@@ -5,7 +5,7 @@
 //! Which level is the caller's choice ([`Textures::sample`] takes it in levels, 0 the image itself).
 //!
 //! Layout: 4 bytes a texel in the image's own encoding; level 0 is borrowed from the scene, the other levels cost
-//! another third and exist only for samplers that ask for mipmaps. Cost: some 15 ns for a bilinear sample.
+//! another third and exist only for samplers that ask for mipmaps. Cost: some 40 ns for a bilinear sample.
 //! Limits: no anisotropic filtering; levels are rounded to eight bits like on any GPU.
 
 mod pyramid;
