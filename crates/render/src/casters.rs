@@ -43,7 +43,12 @@ impl<'t> CasterRules<'t> {
                 *candidate &= !transparent;
             }
         }
-        Self { topology, policy, candidates, transparent }
+        Self {
+            topology,
+            policy,
+            candidates,
+            transparent,
+        }
     }
 
     /// Whether a triangle lets light through, so that grids leave it to the hierarchy.
@@ -64,9 +69,7 @@ impl<'t> CasterRules<'t> {
                 self.candidates[c as usize]
                     && match *light {
                         Light::Directional(_) => true,
-                        Light::Point(p) => {
-                            self.topology.winding_number(&triangles, c, p.as_dvec3()) == 0
-                        }
+                        Light::Point(p) => self.topology.winding_number(&triangles, c, p.as_dvec3()) == 0,
                     }
             })
             .collect();
@@ -87,7 +90,12 @@ impl<'t> CasterRules<'t> {
 
 /// The frame's triangles as the structures take them.
 pub(crate) fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
-    Triangles { x: &geometry.x, y: &geometry.y, z: &geometry.z, indices: &geometry.indices }
+    Triangles {
+        x: &geometry.x,
+        y: &geometry.y,
+        z: &geometry.z,
+        indices: &geometry.indices,
+    }
 }
 
 /// Per triangle, whether its material is masked or blended; empty if none is.
@@ -97,5 +105,7 @@ fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
         return Vec::new();
     }
     let objects = geometry.objects.iter();
-    objects.flat_map(|o| std::iter::repeat_n(transparent(o.material), o.triangles.len())).collect()
+    objects
+        .flat_map(|o| std::iter::repeat_n(transparent(o.material), o.triangles.len()))
+        .collect()
 }

@@ -43,7 +43,11 @@ pub struct Progress {
 impl<'s> Renderer<'s> {
     /// A renderer for this scene; prepares its materials and textures.
     pub fn new(scene: &'s Scene) -> Self {
-        Self { scene, shader: Shader::new(scene), topology: None }
+        Self {
+            scene,
+            shader: Shader::new(scene),
+            topology: None,
+        }
     }
 
     /// Renders one frame on the threads of the current rayon pool. The picture is the same for any number of
@@ -76,7 +80,10 @@ impl<'s> Renderer<'s> {
         let build = start.elapsed();
 
         let start = Instant::now();
-        let shading_lights: Vec<_> = lights.iter().map(|l| ShadingLight::new(l, geometry.origin)).collect();
+        let shading_lights: Vec<_> = lights
+            .iter()
+            .map(|l| ShadingLight::new(l, geometry.origin))
+            .collect();
         let shader = TileShader {
             shader: &self.shader,
             geometry,
@@ -95,7 +102,10 @@ impl<'s> Renderer<'s> {
             .enumerate()
             .map_init(TileWork::default, |work, (index, out)| {
                 let counts = shader.render(index as u32, work, out);
-                progress(Progress { done: done.fetch_add(1, Ordering::Relaxed) + 1, total });
+                progress(Progress {
+                    done: done.fetch_add(1, Ordering::Relaxed) + 1,
+                    total,
+                });
                 counts
             })
             .reduce(TileCounts::default, TileCounts::sum);

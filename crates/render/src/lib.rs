@@ -21,8 +21,8 @@ mod tile;
 pub mod tonemap;
 
 pub use camera::CameraFrame;
-pub use compare::{CompareOptions, Comparison, compare};
 pub use casters::CasterRules;
+pub use compare::{CompareOptions, Comparison, compare};
 pub use error::{Error, Result};
 pub use film::{Film, LayerKind, Layers, NO_ID, Sample, TileMut};
 pub use frame::{Progress, RenderedFrame, Renderer};

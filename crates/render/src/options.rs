@@ -61,6 +61,10 @@ pub enum CasterPolicy {
 impl RenderOptions {
     /// The policy in force: the papers' parameters bring their own.
     pub(crate) fn casters(&self) -> CasterPolicy {
-        if self.paper { CasterPolicy::Back } else { self.casters }
+        if self.paper {
+            CasterPolicy::Back
+        } else {
+            self.casters
+        }
     }
 }

@@ -39,13 +39,22 @@ const WIDEST_CONE: f32 = 1.2;
 impl FramePlan {
     /// The plan for these lights. Area lights cast the hard shadow of their centre.
     pub fn new(geometry: &FrameGeometry, lights: &[PosedLight], options: &RenderOptions) -> Self {
-        let eye = if options.paper { EyeGridOptions::paper() } else { EyeGridOptions::default() };
-        let grid = if options.paper { LightGridOptions::paper() } else { LightGridOptions::default() };
+        let eye = if options.paper {
+            EyeGridOptions::paper()
+        } else {
+            EyeGridOptions::default()
+        };
+        let grid = if options.paper {
+            LightGridOptions::paper()
+        } else {
+            LightGridOptions::default()
+        };
         let plan = |light: &PosedLight| {
             let cone = match light.kind {
-                LightKind::Spot { outer, .. } if outer < WIDEST_CONE => {
-                    Some(Cone { axis: light.direction.normalize_or(DVec3::NEG_Z), half_angle: f64::from(outer) })
-                }
+                LightKind::Spot { outer, .. } if outer < WIDEST_CONE => Some(Cone {
+                    axis: light.direction.normalize_or(DVec3::NEG_Z),
+                    half_angle: f64::from(outer),
+                }),
                 _ => None,
             };
             LightPlan {
@@ -54,7 +63,10 @@ impl FramePlan {
                 grid: LightGridOptions { cone, ..grid },
             }
         };
-        let lights = lights.iter().map(|light| options.shadows.then(|| plan(light))).collect();
+        let lights = lights
+            .iter()
+            .map(|light| options.shadows.then(|| plan(light)))
+            .collect();
         Self { eye, lights }
     }
 }

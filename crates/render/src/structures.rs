@@ -53,7 +53,11 @@ impl<'g> FrameStructures<'g> {
             let start = Instant::now();
             let rule = rules.for_light(geometry, &plan.light);
             let grid = PointLightGrid::build(plan.light, triangles, &rule, plan.grid, options.level);
-            let name = if plan.name.is_empty() { i.to_string() } else { format!("{:?}", plan.name) };
+            let name = if plan.name.is_empty() {
+                i.to_string()
+            } else {
+                format!("{:?}", plan.name)
+            };
             stats.push(StructureStats {
                 name: format!("light grid {name}"),
                 build: start.elapsed(),
@@ -76,6 +80,11 @@ impl<'g> FrameStructures<'g> {
             });
             bvh
         });
-        Self { eye, lights, layers, stats }
+        Self {
+            eye,
+            lights,
+            layers,
+            stats,
+        }
     }
 }

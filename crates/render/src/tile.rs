@@ -6,11 +6,11 @@ use rayward_scene::FrameGeometry;
 use rayward_trace::{Accel, Bvh, Hit, Light, Ray, Receiver, ShadowScratch, Tile, TileHits, exact};
 
 use crate::casters::{CasterRules, triangles};
-use crate::{Sample, TileMut};
 use crate::plan::LightPlan;
 use crate::shade::{ambient, direct, object_of};
 use crate::structures::FrameStructures;
 use crate::{CameraFrame, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
+use crate::{Sample, TileMut};
 
 /// Everything a tile needs to know of its frame.
 pub(crate) struct TileShader<'f> {
@@ -98,11 +98,15 @@ impl TileShader<'_> {
     /// Notes the surfaces that a pixel sees; returns the pixel without their light.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
         let mut sample = Sample::background(self.options.background);
-        let Some(prim) = work.hits.prim(x, y) else { return sample };
+        let Some(prim) = work.hits.prim(x, y) else {
+            return sample;
+        };
         let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
         let eye_ray = Ray::new(ray.origin.as_vec3(), ray.dir.as_vec3());
         let corners = triangles(self.geometry).corners(prim);
-        let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) else { return sample };
+        let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) else {
+            return sample;
+        };
         let object = object_of(self.geometry, prim);
         let (t, length) = (hit.t as f32, ray.dir.length() as f32);
         let point = SurfacePoint {
@@ -125,11 +129,26 @@ impl TileShader<'_> {
             bary: Vec2::new(point.u, point.v),
         };
         let receiver = Receiver::on_surface(&eye_ray, hit.t, prim);
-        let receiver = Receiver { point: ray.origin + ray.dir * hit.t, ..receiver };
-        let first = ShadedPoint { x, y, receiver, weight: surface.alpha, color: self.glow(&surface), surface };
+        let receiver = Receiver {
+            point: ray.origin + ray.dir * hit.t,
+            ..receiver
+        };
+        let first = ShadedPoint {
+            x,
+            y,
+            receiver,
+            weight: surface.alpha,
+            color: self.glow(&surface),
+            surface,
+        };
         let mut left = 1.0 - first.weight;
         work.points.push(first);
-        let first_hit = Hit { t, u: point.u, v: point.v, prim };
+        let first_hit = Hit {
+            t,
+            u: point.u,
+            v: point.v,
+            prim,
+        };
         if let (true, Some(bvh)) = (left > 0.0, &self.structures.layers) {
             left = self.see_through(bvh, &eye_ray, &first_hit, [x, y], work);
         }
@@ -140,17 +159,14 @@ impl TileShader<'_> {
 
     /// Notes what is seen behind a surface that does not cover its pixel, front to back; returns the share of the
     /// pixel that nothing covers.
-    fn see_through(
-        &self,
-        bvh: &Bvh,
-        ray: &Ray,
-        first: &Hit,
-        [x, y]: [u32; 2],
-        work: &mut TileWork,
-    ) -> f32 {
+    fn see_through(&self, bvh: &Bvh, ray: &Ray, first: &Hit, [x, y]: [u32; 2], work: &mut TileWork) -> f32 {
         let mut left = 1.0 - work.points.last().map_or(0.0, |point| point.weight);
         bvh.all_hits(ray, &mut work.layers);
-        for hit in work.layers.iter().filter(|h| h.prim != first.prim && h.t >= first.t) {
+        for hit in work
+            .layers
+            .iter()
+            .filter(|h| h.prim != first.prim && h.t >= first.t)
+        {
             let object = object_of(self.geometry, hit.prim);
             let point = SurfacePoint {
                 prim: hit.prim,
@@ -171,7 +187,14 @@ impl TileShader<'_> {
             let weight = left * surface.alpha;
             left -= weight;
             if weight > 0.0 {
-                work.points.push(ShadedPoint { x, y, receiver, weight, color: self.glow(&surface), surface });
+                work.points.push(ShadedPoint {
+                    x,
+                    y,
+                    receiver,
+                    weight,
+                    color: self.glow(&surface),
+                    surface,
+                });
             }
             if left < INVISIBLE {
                 return 0.0;
@@ -187,7 +210,15 @@ impl TileShader<'_> {
 
     /// Adds the light of one source to all points of the tile that it reaches.
     fn illuminate(&self, light: usize, work: &mut TileWork) {
-        let TileWork { points, receivers, asked, shadow, scratch, filters, .. } = work;
+        let TileWork {
+            points,
+            receivers,
+            asked,
+            shadow,
+            scratch,
+            filters,
+            ..
+        } = work;
         receivers.clear();
         asked.clear();
         for (i, point) in points.iter().enumerate() {
@@ -203,8 +234,11 @@ impl TileShader<'_> {
                 shadow.resize(receivers.len(), false);
             }
         }
-        for ((&(i, radiance), receiver), _) in
-            asked.iter().zip(&*receivers).zip(&*shadow).filter(|(_, in_shadow)| !**in_shadow)
+        for ((&(i, radiance), receiver), _) in asked
+            .iter()
+            .zip(&*receivers)
+            .zip(&*shadow)
+            .filter(|(_, in_shadow)| !**in_shadow)
         {
             let passed = match (&self.structures.layers, &self.ends[light]) {
                 (Some(bvh), Some(plan)) => self.transmittance(bvh, receiver, &plan.light, filters),
@@ -225,11 +259,14 @@ impl TileShader<'_> {
         bvh.all_hits(&ray, hits);
         let mut passed = 1.0;
         for hit in hits {
-            let filters = self.rules.is_transparent(hit.prim)
-                && exact::shadows(&triangles, hit.prim, receiver, light);
+            let filters =
+                self.rules.is_transparent(hit.prim) && exact::shadows(&triangles, hit.prim, receiver, light);
             if filters {
                 let object = object_of(self.geometry, hit.prim);
-                passed *= 1.0 - self.shader.coverage(self.geometry, hit.prim, object, hit.u, hit.v);
+                passed *= 1.0
+                    - self
+                        .shader
+                        .coverage(self.geometry, hit.prim, object, hit.u, hit.v);
             }
         }
         passed

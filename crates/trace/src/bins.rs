@@ -98,7 +98,10 @@ impl Bins {
                 prims.push(prim as u32);
             }
         }
-        self.chunks.par_iter_mut().flat_map(|c| &mut c.refs).for_each(|r| *r = number[*r as usize]);
+        self.chunks
+            .par_iter_mut()
+            .flat_map(|c| &mut c.refs)
+            .for_each(|r| *r = number[*r as usize]);
         prims
     }
 
@@ -109,7 +112,10 @@ impl Bins {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.chunks.iter().map(|c| (c.refs.capacity() + c.starts.capacity()) * 4).sum()
+        self.chunks
+            .iter()
+            .map(|c| (c.refs.capacity() + c.starts.capacity()) * 4)
+            .sum()
     }
 }
 
@@ -194,11 +200,15 @@ fn bin(
         }
         return;
     }
-    let Some(precise) = precise.or_else(|| PreciseTriangle::new(view, triangles.corners(prim))) else { return };
+    let Some(precise) = precise.or_else(|| PreciseTriangle::new(view, triangles.corners(prim))) else {
+        return;
+    };
     let side = f64::from(grid.side);
     for y in y0..=y1 {
         let (top, slack) = (f64::from(y) * side, f64::from(SLACK));
-        let Some([from, to]) = precise.row_span(top - slack, top + side + slack) else { continue };
+        let Some([from, to]) = precise.row_span(top - slack, top + side + slack) else {
+            continue;
+        };
         let (from, to) = ((from - slack) / side, (to + slack) / side);
         let column = |x: f64| x.clamp(f64::from(x0), f64::from(x1)) as u32;
         if to >= f64::from(x0) && from <= f64::from(x1 + 1) {

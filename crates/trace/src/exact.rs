@@ -35,13 +35,21 @@ pub struct ExactHit {
 }
 
 fn coord(p: DVec3) -> Coord3D<f64> {
-    Coord3D { x: p.x, y: p.y, z: p.z }
+    Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    }
 }
 
 /// d . (a x b) with the exact sign.
 #[inline]
 fn volume(a: DVec3, b: DVec3, d: DVec3) -> f64 {
-    const ZERO: Coord3D<f64> = Coord3D { x: 0.0, y: 0.0, z: 0.0 };
+    const ZERO: Coord3D<f64> = Coord3D {
+        x: 0.0,
+        y: 0.0,
+        z: 0.0,
+    };
     orient3d(coord(a), coord(b), coord(d), ZERO)
 }
 
@@ -88,7 +96,11 @@ pub fn attributes(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<Exact
     let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
     let doubt = terms * (1.0 / (1u64 << 27) as f64);
     let sound = height.abs() > doubt.dot(a0.abs()) && steepness.abs() > doubt.dot(dir.abs());
-    Some(if sound { hit } else { confined(hit, dir, corners.map(|c| c.as_dvec3() - origin)) })
+    Some(if sound {
+        hit
+    } else {
+        confined(hit, dir, corners.map(|c| c.as_dvec3() - origin))
+    })
 }
 
 /// The hit moved to where the line passes the triangle's box. Hierarchies and grids prune by boxes: a `t` that
@@ -107,7 +119,11 @@ fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
     // All three may be no number; comparisons are written so that it does not survive.
     let share = |x: f64, most: f64| if x > 0.0 { x.min(most) } else { 0.0 };
     let u = share(hit.u, 1.0);
-    ExactHit { t: hit.t.max(enter).min(leave), u, v: share(hit.v, 1.0 - u) }
+    ExactHit {
+        t: hit.t.max(enter).min(leave),
+        u,
+        v: share(hit.v, 1.0 - u),
+    }
 }
 
 /// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its

@@ -9,6 +9,7 @@
 
 use rayon::prelude::*;
 
+use crate::Triangles;
 use crate::bins::{Binning, Bins, CellGrid};
 use crate::exact::{self, ExactHit};
 use crate::kernel::SimdLevel;
@@ -18,7 +19,6 @@ use crate::kernel::tile::{BLOCK, BlockRect, NONE, TileBuffer, draw, draw_batch};
 use crate::kernel::{LANES, NEARNESS_BAND};
 use crate::precise::PreciseTriangle;
 use crate::view::{View, ViewRay};
-use crate::Triangles;
 
 /// Parameters of an [`EyeGrid`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,14 +31,20 @@ pub struct EyeGridOptions {
 
 impl Default for EyeGridOptions {
     fn default() -> Self {
-        Self { tile: 64, binning: Binning::Overlap }
+        Self {
+            tile: 64,
+            binning: Binning::Overlap,
+        }
     }
 }
 
 impl EyeGridOptions {
     /// The literal parameters of HM08: tiles of 100 x 100 pixels, filled by bounding rectangle.
     pub fn paper() -> Self {
-        Self { tile: 100, binning: Binning::Rectangle }
+        Self {
+            tile: 100,
+            binning: Binning::Rectangle,
+        }
     }
 }
 
@@ -97,10 +103,21 @@ impl<'a> EyeGrid<'a> {
     pub fn build(view: View, triangles: Triangles<'a>, options: EyeGridOptions, level: SimdLevel) -> Self {
         let side = options.tile.clamp(BLOCK, 256).next_multiple_of(BLOCK);
         let cells = [view.width.div_ceil(side), view.height.div_ceil(side)];
-        let grid = CellGrid { cells, side: side as f32, pixel_centres: true };
+        let grid = CellGrid {
+            cells,
+            side: side as f32,
+            pixel_centres: true,
+        };
         let vertices = project_all(level, &view, &triangles);
         let bins = Bins::build(&view, &triangles, &vertices, &grid, options.binning, |_| true);
-        Self { view, triangles, level, vertices, grid, bins }
+        Self {
+            view,
+            triangles,
+            level,
+            vertices,
+            grid,
+            bins,
+        }
     }
 
     /// The view it was built for.
@@ -116,9 +133,18 @@ impl<'a> EyeGrid<'a> {
     /// The tile of that index.
     pub fn tile(&self, index: u32) -> Tile {
         let side = self.grid.side as u32;
-        let (x, y) = (index % self.grid.cells[0] * side, index / self.grid.cells[0] * side);
+        let (x, y) = (
+            index % self.grid.cells[0] * side,
+            index / self.grid.cells[0] * side,
+        );
         let (width, height) = (side.min(self.view.width - x), side.min(self.view.height - y));
-        Tile { index, x, y, width, height }
+        Tile {
+            index,
+            x,
+            y,
+            width,
+            height,
+        }
     }
 
     /// References from tiles to triangles.
@@ -144,7 +170,12 @@ impl<'a> EyeGrid<'a> {
     }
 
     fn draw_batch(&self, tile: &Tile, blocks: [u32; 2], prims: &[u32], hits: &mut TileHits) {
-        let TileHits { buffer, vertices, edges, .. } = hits;
+        let TileHits {
+            buffer,
+            vertices,
+            edges,
+            ..
+        } = hits;
         vertices.count = 0;
         for &prim in prims {
             let corners = self.triangles.indices[prim as usize].map(|i| &self.vertices[i as usize]);
@@ -159,8 +190,12 @@ impl<'a> EyeGrid<'a> {
     }
 
     fn draw_precise(&self, tile: &Tile, blocks: [u32; 2], prim: u32, buffer: &mut TileBuffer) {
-        let Some(precise) = PreciseTriangle::new(&self.view, self.triangles.corners(prim)) else { return };
-        let Some([min, max]) = precise.bounds(&self.view) else { return };
+        let Some(precise) = PreciseTriangle::new(&self.view, self.triangles.corners(prim)) else {
+            return;
+        };
+        let Some([min, max]) = precise.bounds(&self.view) else {
+            return;
+        };
         let range = |axis: usize, origin: u32| {
             let last = f64::from(blocks[axis] * BLOCK - 1);
             let origin = f64::from(origin) + 0.5;
@@ -168,7 +203,10 @@ impl<'a> EyeGrid<'a> {
             let end = (max[axis] - origin).clamp(0.0, last).ceil() as u32;
             [first / BLOCK, end / BLOCK]
         };
-        let rect = BlockRect { x: range(0, tile.x), y: range(1, tile.y) };
+        let rect = BlockRect {
+            x: range(0, tile.x),
+            y: range(1, tile.y),
+        };
         let reach = f64::from(blocks[0].max(blocks[1]) * BLOCK);
         let record = precise.record(prim, [f64::from(tile.x), f64::from(tile.y)], reach);
         draw(self.level, buffer, &record, rect);
@@ -189,10 +227,14 @@ impl<'a> EyeGrid<'a> {
             }
             hits.exact_pixels += 1;
             let ray = self.view.pixel_ray(tile.x + x, tile.y + y);
-            let Some(hit) = self.exact_hit(&ray, unsure.prim) else { continue };
+            let Some(hit) = self.exact_hit(&ray, unsure.prim) else {
+                continue;
+            };
             let stored = buffer.prim[block][lane];
             let closer = stored == NONE
-                || self.exact_hit(&ray, stored).is_none_or(|s| (hit.t, unsure.prim) < (s.t, stored));
+                || self
+                    .exact_hit(&ray, stored)
+                    .is_none_or(|s| (hit.t, unsure.prim) < (s.t, stored));
             if closer {
                 buffer.prim[block][lane] = unsure.prim;
                 buffer.nearness[block][lane] = self.view.nearness(hit.t) as f32;

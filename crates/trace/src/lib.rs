@@ -24,22 +24,22 @@ mod light_grid;
 mod light_views;
 mod precise;
 mod ray;
+pub mod space;
 #[cfg(test)]
 mod test_meshes;
-pub mod space;
 pub mod topology;
 mod triangles;
 pub mod view;
 
+pub use accel::{Accel, BuildStats, Count, Counters};
 pub use bins::Binning;
+pub use brute::BruteForce;
+pub use bvh::Bvh;
 pub use eye_grid::{EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use kernel::SimdLevel;
 pub use light_grid::{
     CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };
-pub use accel::{Accel, BuildStats, Count, Counters};
-pub use brute::BruteForce;
-pub use bvh::Bvh;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use topology::Topology;
 pub use triangles::Triangles;

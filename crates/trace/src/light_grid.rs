@@ -45,7 +45,11 @@ pub struct LightGridOptions {
 impl LightGridOptions {
     /// The literal parameters of HM08: 200 x 200 cells, filled by bounding rectangle.
     pub fn paper() -> Self {
-        Self { resolution: Some(200), binning: Binning::Rectangle, cone: None }
+        Self {
+            resolution: Some(200),
+            binning: Binning::Rectangle,
+            cone: None,
+        }
     }
 }
 
@@ -133,7 +137,12 @@ impl<'a> PointLightGrid<'a> {
             .into_iter()
             .map(|view| Face::build(view, &light, &triangles, rule, &options, level))
             .collect();
-        Self { light, triangles, level, faces }
+        Self {
+            light,
+            triangles,
+            level,
+            faces,
+        }
     }
 
     /// Cells of all faces.
@@ -153,9 +162,8 @@ impl<'a> PointLightGrid<'a> {
 
     /// Bytes held by the grid.
     pub fn bytes(&self) -> usize {
-        let face = |f: &Face| {
-            f.bins.bytes() + f.casters.capacity() * size_of::<Caster>() + f.nearest.capacity() * 4
-        };
+        let face =
+            |f: &Face| f.bins.bytes() + f.casters.capacity() * size_of::<Caster>() + f.nearest.capacity() * 4;
         self.faces.iter().map(face).sum()
     }
 
@@ -179,7 +187,9 @@ impl<'a> PointLightGrid<'a> {
         scratch.pending.clear();
         scratch.counts.receivers += receivers.len() as u64;
         for (i, receiver) in receivers.iter().enumerate() {
-            let Some((face, raster)) = self.locate(receiver.point) else { continue };
+            let Some((face, raster)) = self.locate(receiver.point) else {
+                continue;
+            };
             let f = &self.faces[face];
             let cell = f.cell(raster[0], raster[1]);
             if raster[2] >= f.nearest[cell] {
@@ -187,9 +197,16 @@ impl<'a> PointLightGrid<'a> {
                 continue;
             }
             let (face, cell) = (face as u32, cell as u32);
-            scratch.pending.push(Pending { face, cell, receiver: i as u32, raster });
+            scratch.pending.push(Pending {
+                face,
+                cell,
+                receiver: i as u32,
+                raster,
+            });
         }
-        scratch.pending.sort_unstable_by_key(|p| (p.face, p.cell, p.receiver));
+        scratch
+            .pending
+            .sort_unstable_by_key(|p| (p.face, p.cell, p.receiver));
     }
 
     /// The face a point lies in with its raster coordinates and nearness; `None` if no caster can be before it.
@@ -204,7 +221,11 @@ impl<'a> PointLightGrid<'a> {
         let view = &self.faces[face].view;
         let h = view.homogeneous(point);
         let inverse = 1.0 / h.p.z;
-        let raster = [(h.p.x * inverse) as f32, (h.p.y * inverse) as f32, (h.m * inverse) as f32];
+        let raster = [
+            (h.p.x * inverse) as f32,
+            (h.p.y * inverse) as f32,
+            (h.m * inverse) as f32,
+        ];
         let within = |v: f32, size: u32| v >= -1.0 && v <= size as f32 + 1.0;
         let seen = within(raster[0], view.width) && within(raster[1], view.height);
         seen.then_some((face, raster))
@@ -228,7 +249,14 @@ impl<'a> PointLightGrid<'a> {
         let mut open = all;
         scratch.unsure.clear();
         for refs in face.bins.cell(batch[0].cell as usize) {
-            open = shadowed(self.level, &scratch.points, open, &face.casters, refs, &mut scratch.unsure);
+            open = shadowed(
+                self.level,
+                &scratch.points,
+                open,
+                &face.casters,
+                refs,
+                &mut scratch.unsure,
+            );
             if open == 0 {
                 break;
             }
@@ -267,13 +295,22 @@ impl Face {
             survey(&project_all(level, &coarse, triangles), triangles)
         });
         let view = raster(resolution.clamp(1, MAX_RESOLUTION));
-        let grid = CellGrid { cells: [view.width, view.height], side: 1.0, pixel_centres: false };
+        let grid = CellGrid {
+            cells: [view.width, view.height],
+            side: 1.0,
+            pixel_centres: false,
+        };
         let vertices = project_all(level, &view, triangles);
         let mut bins = Bins::build(&view, triangles, &vertices, &grid, options.binning, keep);
         let prims = bins.number_references(triangles.len());
         let casters = set_up_all(level, &view, triangles, &vertices, &prims);
         let nearest = nearest_per_cell(&view, triangles, &vertices, &bins, &prims, &casters);
-        Self { view, bins, casters, nearest }
+        Self {
+            view,
+            bins,
+            casters,
+            nearest,
+        }
     }
 
     /// Cell of a raster point; points a little outside belong to the border.
@@ -334,7 +371,10 @@ fn survey(vertices: &[RasterVertex], triangles: &Triangles) -> u32 {
             + RECEIVERS * PER_RECEIVER_AND_REFERENCE * references / (n * n)
     };
     let candidates = [32, 64, 96, 128, 192, 256, 384, 512, 768, 1024];
-    candidates.into_iter().min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(32)
+    candidates
+        .into_iter()
+        .min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+        .unwrap_or(32)
 }
 
 /// Whether a triangle is put into the grid.
@@ -363,19 +403,27 @@ fn set_up_all(
     prims: &[u32],
 ) -> Vec<Caster> {
     let mut casters = vec![Caster::default(); prims.len()];
-    let chunks = casters.par_chunks_mut(CASTER_CHUNK).zip(prims.par_chunks(CASTER_CHUNK));
+    let chunks = casters
+        .par_chunks_mut(CASTER_CHUNK)
+        .zip(prims.par_chunks(CASTER_CHUNK));
     chunks.for_each(|(casters, prims)| {
         let (mut lanes, mut edges) = (VertexLanes::default(), EdgeLanes::default());
         for (casters, prims) in casters.chunks_mut(LANES).zip(prims.chunks(LANES)) {
             lanes.count = 0;
             for &prim in prims {
-                lanes.push(prim, triangles.indices[prim as usize].map(|i| &vertices[i as usize]));
+                lanes.push(
+                    prim,
+                    triangles.indices[prim as usize].map(|i| &vertices[i as usize]),
+                );
             }
             set_up_casters(level, &lanes, Origin::OwnCorner, &mut edges);
             for (lane, caster) in casters.iter_mut().enumerate() {
                 *caster = if edges.good & (1 << lane) != 0 {
                     let origin = [lanes.x[0][lane], lanes.y[0][lane]];
-                    Caster { record: edges.record(lane, prims[lane]), origin }
+                    Caster {
+                        record: edges.record(lane, prims[lane]),
+                        origin,
+                    }
                 } else {
                     precise_caster(view, triangles.corners(prims[lane]), prims[lane])
                 };
@@ -391,10 +439,17 @@ fn precise_caster(view: &View, corners: [Vec3; 3], prim: u32) -> Caster {
     let reach = f64::from(view.width.max(view.height));
     let record = PreciseTriangle::new(view, corners).map_or_else(
         // Nothing hits it: outside everywhere.
-        || EdgeRecord { c: [f32::NEG_INFINITY; 3], prim, ..EdgeRecord::default() },
+        || EdgeRecord {
+            c: [f32::NEG_INFINITY; 3],
+            prim,
+            ..EdgeRecord::default()
+        },
         |precise| precise.record(prim, origin, reach),
     );
-    Caster { record, origin: origin.map(|v| v as f32) }
+    Caster {
+        record,
+        origin: origin.map(|v| v as f32),
+    }
 }
 
 /// For every cell the bound on its casters' nearness: of each the smaller of its largest vertex and its plane's
@@ -422,19 +477,23 @@ fn nearest_per_cell(
         })
         .collect();
     let mut nearest = vec![0.0f32; columns * view.height as usize];
-    nearest.par_chunks_mut(columns).enumerate().for_each(|(row, nearest)| {
-        for (column, nearest) in nearest.iter_mut().enumerate() {
-            let corner = [column as f32, row as f32];
-            for &r in bins.cell(row * columns + column).flatten() {
-                let mut bound = bounds[r as usize];
-                if bound < 0.0 {
-                    let corners = triangles.indices[prims[r as usize] as usize].map(|i| &vertices[i as usize]);
-                    bound = nearness_bound(&casters[r as usize], corners, corner);
+    nearest
+        .par_chunks_mut(columns)
+        .enumerate()
+        .for_each(|(row, nearest)| {
+            for (column, nearest) in nearest.iter_mut().enumerate() {
+                let corner = [column as f32, row as f32];
+                for &r in bins.cell(row * columns + column).flatten() {
+                    let mut bound = bounds[r as usize];
+                    if bound < 0.0 {
+                        let corners =
+                            triangles.indices[prims[r as usize] as usize].map(|i| &vertices[i as usize]);
+                        bound = nearness_bound(&casters[r as usize], corners, corner);
+                    }
+                    *nearest = nearest.max(bound);
                 }
-                *nearest = nearest.max(bound);
             }
-        }
-    });
+        });
     nearest
 }
 
@@ -442,7 +501,10 @@ fn nearest_per_cell(
 fn nearness_bound(caster: &Caster, corners: [&RasterVertex; 3], cell: [f32; 2]) -> f32 {
     let Caster { record, origin } = caster;
     let vertex_bound = if corners.iter().all(|v| v.nearness > 0.0) {
-        corners[0].nearness.max(corners[1].nearness).max(corners[2].nearness)
+        corners[0]
+            .nearness
+            .max(corners[1].nearness)
+            .max(corners[2].nearness)
     } else {
         f32::INFINITY
     };
@@ -452,7 +514,10 @@ fn nearness_bound(caster: &Caster, corners: [&RasterVertex; 3], cell: [f32; 2]) 
     let range = |axis: usize, v: [f32; 3]| {
         let (low, high) = (cell[axis] - 0.01, cell[axis] + 1.01);
         if vertex_bound.is_finite() {
-            (low.max(v[0].min(v[1]).min(v[2])), high.min(v[0].max(v[1]).max(v[2])))
+            (
+                low.max(v[0].min(v[1]).min(v[2])),
+                high.min(v[0].max(v[1]).max(v[2])),
+            )
         } else {
             (low, high)
         }

@@ -29,12 +29,18 @@ const CUBE_FACES: [[DVec3; 3]; 6] = [
 /// The views of a light onto these triangles; none where there is nothing to see, or where the light has no
 /// finite position or direction.
 pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Vec<View> {
-    let Some(bounds) = Bounds::of(triangles) else { return Vec::new() };
+    let Some(bounds) = Bounds::of(triangles) else {
+        return Vec::new();
+    };
     let views = match *light {
         Light::Directional(direction) => {
             let forward = -direction.as_dvec3();
             let valid = forward.is_finite() && forward != DVec3::ZERO;
-            if valid { vec![parallel(&bounds, forward.normalize())] } else { Vec::new() }
+            if valid {
+                vec![parallel(&bounds, forward.normalize())]
+            } else {
+                Vec::new()
+            }
         }
         Light::Point(position) if !position.is_finite() => Vec::new(),
         Light::Point(position) => match cone {
@@ -44,11 +50,16 @@ pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) ->
             }
             None => match single_face(&bounds, position) {
                 Some(view) => vec![view],
-                None => CUBE_FACES.map(|axes| unit_view(position, axes, CUBE_FACE_TAN)).to_vec(),
+                None => CUBE_FACES
+                    .map(|axes| unit_view(position, axes, CUBE_FACE_TAN))
+                    .to_vec(),
             },
         },
     };
-    views.into_iter().filter_map(|view| bounds.window(&view)).collect()
+    views
+        .into_iter()
+        .filter_map(|view| bounds.window(&view))
+        .collect()
 }
 
 /// A perspective view on a raster of one unit.
@@ -96,7 +107,9 @@ impl Bounds {
     fn of(triangles: &Triangles) -> Option<Self> {
         let range = |values: &[f32]| {
             let finite = values.iter().filter(|v| v.is_finite());
-            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+            finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &v| {
+                (low.min(v), high.max(v))
+            })
         };
         let axes = [triangles.x, triangles.y, triangles.z].map(range);
         if triangles.is_empty() || axes.iter().any(|(low, high)| low > high) {
@@ -106,7 +119,10 @@ impl Bounds {
         let max = Vec3::from(axes.map(|a| a.1)).as_dvec3();
         let largest = min.abs().max(max.abs()).max_element();
         let slack = DVec3::splat((max - min).length() * 1e-3 + largest * 1e-6 + 1e-30);
-        Some(Self { min: min - slack, max: max + slack })
+        Some(Self {
+            min: min - slack,
+            max: max + slack,
+        })
     }
 
     fn middle(&self) -> DVec3 {
@@ -114,7 +130,13 @@ impl Bounds {
     }
 
     fn corner(&self, i: usize) -> DVec3 {
-        let pick = |axis: usize| if i >> axis & 1 == 0 { self.min[axis] } else { self.max[axis] };
+        let pick = |axis: usize| {
+            if i >> axis & 1 == 0 {
+                self.min[axis]
+            } else {
+                self.max[axis]
+            }
+        };
         DVec3::new(pick(0), pick(1), pick(2))
     }
 
@@ -124,8 +146,14 @@ impl Bounds {
 
     /// The view cut to the part of its raster that shows the box.
     fn window(&self, view: &View) -> Option<View> {
-        const QUADS: [[usize; 4]; 6] =
-            [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+        const QUADS: [[usize; 4]; 6] = [
+            [0, 1, 3, 2],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 3, 7, 6],
+            [0, 2, 6, 4],
+            [1, 3, 7, 5],
+        ];
         let mut window: Option<[[f64; 2]; 2]> = None;
         for [a, b, c, d] in QUADS {
             for triangle in [[a, b, c], [a, c, d]] {

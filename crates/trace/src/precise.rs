@@ -48,7 +48,11 @@ impl PreciseTriangle {
         let origin = raster_point_near(view, homogeneous.map(|h| h.p));
         let points = homogeneous.map(|h| h.p - DVec3::new(origin[0], origin[1], 0.0) * h.p.z);
         let [p0, p1, p2] = points;
-        let edges = [p1.cross(p2) * orientation, p2.cross(p0) * orientation, p0.cross(p1) * orientation];
+        let edges = [
+            p1.cross(p2) * orientation,
+            p2.cross(p0) * orientation,
+            p0.cross(p1) * orientation,
+        ];
 
         // Sizes of the coordinates now, and of those whose rounding they carry.
         let size = points.map(|p| p.abs().element_sum());
@@ -69,7 +73,15 @@ impl PreciseTriangle {
             Arrangement::Perspective => f64::INFINITY,
             Arrangement::Parallel { reach } => reach * (1.0 - f64::from(NEARNESS_BAND)),
         };
-        Some(Self { origin, points, edges, edge_errors, nearness, nearness_error, ceiling })
+        Some(Self {
+            origin,
+            points,
+            edges,
+            edge_errors,
+            nearness,
+            nearness_error,
+            ceiling,
+        })
     }
 
     /// The range of x in which rays with y from `top` to `bottom` may hit; never too small. `None` if none may.
@@ -135,7 +147,10 @@ impl PreciseTriangle {
         let extent = x.abs() + y.abs() + 2.0 * reach + 1.0;
         let at_origin = |p: DVec3| DVec3::new(p.x, p.y, p.x * x + p.y * y + p.z);
         let rounding = |p: DVec3| 8.0 * f64::from(ROUNDOFF) * ((p.x.abs() + p.y.abs()) * reach + p.z.abs());
-        let mut record = EdgeRecord { prim, ..EdgeRecord::default() };
+        let mut record = EdgeRecord {
+            prim,
+            ..EdgeRecord::default()
+        };
         for i in 0..3 {
             let edge = at_origin(self.edges[i]);
             let edge = edge / (1.01 * (self.edge_errors[i] * extent + rounding(edge)));
@@ -162,7 +177,11 @@ fn raster_point_near(view: &View, points: [DVec3; 3]) -> [f64; 2] {
 
 /// Exact sign of the edge functions inside the triangle: which way round it lies in the raster.
 fn orientation(view: &View, corners: [Vec3; 3]) -> f64 {
-    let coord = |p: DVec3| Coord3D { x: p.x, y: p.y, z: p.z };
+    let coord = |p: DVec3| Coord3D {
+        x: p.x,
+        y: p.y,
+        z: p.z,
+    };
     let zero = coord(DVec3::ZERO);
     let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
     let volume = match view.arrangement {
@@ -170,12 +189,14 @@ fn orientation(view: &View, corners: [Vec3; 3]) -> f64 {
             let c = view.center.as_dvec3();
             orient3d(coord(v0 - c), coord(v1 - c), coord(v2 - c), zero)
         }
-        Arrangement::Parallel { .. } => {
-            orient3d(coord(v1 - v0), coord(v2 - v0), coord(view.forward), zero)
-        }
+        Arrangement::Parallel { .. } => orient3d(coord(v1 - v0), coord(v2 - v0), coord(view.forward), zero),
     };
     let handedness = -view.right.cross(view.up).dot(view.forward);
-    if volume == 0.0 { 0.0 } else { volume.signum() * handedness.signum() }
+    if volume == 0.0 {
+        0.0
+    } else {
+        volume.signum() * handedness.signum()
+    }
 }
 
 /// The part of a convex polygon where `plane . p >= 0` (Sutherland and Hodgman).

@@ -21,7 +21,12 @@ pub struct Ray {
 impl Ray {
     /// A ray from `origin` along `dir` without an end.
     pub fn new(origin: Vec3, dir: Vec3) -> Self {
-        Self { origin, t_min: 0.0, dir, t_max: f32::INFINITY }
+        Self {
+            origin,
+            t_min: 0.0,
+            dir,
+            t_max: f32::INFINITY,
+        }
     }
 
     /// Whether the ray can hit anything at all.
@@ -67,12 +72,20 @@ impl Receiver {
         // One rounding each for product and sum and a few for t make some 2^-50 of these magnitudes; 2^-40
         // leaves room for grazing views, where an error in depth grows by the inverse cosine.
         let error = (origin.abs() + along.abs()).max_element() * 2f64.powi(-40);
-        Self { point: origin + along, error, prim }
+        Self {
+            point: origin + along,
+            error,
+            prim,
+        }
     }
 
     /// A point in free space, for instance a sensor.
     pub fn free(point: DVec3) -> Self {
-        Self { point, error: 0.0, prim: u32::MAX }
+        Self {
+            point,
+            error: 0.0,
+            prim: u32::MAX,
+        }
     }
 }
 

@@ -10,7 +10,10 @@ pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
     pub(crate) fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
         ((self.0 >> 40) as f32) / (1u64 << 23) as f32 - 1.0
     }
 
@@ -83,17 +86,29 @@ impl Mesh {
     /// Coplanar overlaps, duplicates, slivers, a huge ground, and triangles that are left out.
     pub(crate) fn awkward() -> Self {
         let mut mesh = Self::soup(5, 40, 0.5, 1.0);
-        let quad = [Vec3::new(-0.5, -0.5, 0.1), Vec3::new(0.5, -0.5, 0.1), Vec3::new(0.5, 0.5, 0.1)];
+        let quad = [
+            Vec3::new(-0.5, -0.5, 0.1),
+            Vec3::new(0.5, -0.5, 0.1),
+            Vec3::new(0.5, 0.5, 0.1),
+        ];
         for i in 0..6 {
             mesh.triangle(quad.map(|p| p + Vec3::new(0.03 * i as f32, 0.0, 0.0)));
             mesh.triangle(quad);
         }
         for i in 0..20 {
             let y = i as f32 * 0.05 - 0.5;
-            mesh.triangle([Vec3::new(-3.0, y, 0.4), Vec3::new(3.0, y, 0.2), Vec3::new(3.0, y + 1e-6, 0.2)]);
+            mesh.triangle([
+                Vec3::new(-3.0, y, 0.4),
+                Vec3::new(3.0, y, 0.2),
+                Vec3::new(3.0, y + 1e-6, 0.2),
+            ]);
         }
         let far = 1e5;
-        mesh.triangle([Vec3::new(-far, -0.8, -far), Vec3::new(far, -0.8, -far), Vec3::new(0.0, -0.8, far)]);
+        mesh.triangle([
+            Vec3::new(-far, -0.8, -far),
+            Vec3::new(far, -0.8, -far),
+            Vec3::new(0.0, -0.8, far),
+        ]);
         mesh.triangle([Vec3::ZERO; 3]);
         mesh.triangle([Vec3::ZERO, Vec3::X, Vec3::X * 2.0]);
         mesh.triangle([Vec3::NAN, Vec3::X, Vec3::Y]);
@@ -102,7 +117,11 @@ impl Mesh {
     }
 
     pub(crate) fn scaled(mut self, scale: f32, offset: Vec3) -> Self {
-        for (values, offset) in [(&mut self.x, offset.x), (&mut self.y, offset.y), (&mut self.z, offset.z)] {
+        for (values, offset) in [
+            (&mut self.x, offset.x),
+            (&mut self.y, offset.y),
+            (&mut self.z, offset.z),
+        ] {
             values.iter_mut().for_each(|v| *v = *v * scale + offset);
         }
         self

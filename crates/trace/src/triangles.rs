@@ -23,9 +23,15 @@ impl<'a> Triangles<'a> {
     /// # Panics
     /// If the coordinate arrays differ in length or an index is out of range.
     pub fn new(x: &'a [f32], y: &'a [f32], z: &'a [f32], indices: &'a [[u32; 3]]) -> Self {
-        assert!(x.len() == y.len() && y.len() == z.len(), "coordinate arrays differ in length");
+        assert!(
+            x.len() == y.len() && y.len() == z.len(),
+            "coordinate arrays differ in length"
+        );
         let largest = indices.iter().flatten().copied().max();
-        assert!(largest.is_none_or(|i| (i as usize) < x.len()), "triangle index out of range");
+        assert!(
+            largest.is_none_or(|i| (i as usize) < x.len()),
+            "triangle index out of range"
+        );
         Self { x, y, z, indices }
     }
 

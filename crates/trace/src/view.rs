@@ -91,7 +91,10 @@ impl View {
     /// A parallel view of half extents `half`, for depths up to half of `reach` in magnitude.
     pub fn parallel(center: Vec3, axes: [DVec3; 3], half: [f64; 2], reach: f64, size: [u32; 2]) -> Self {
         let arrangement = Arrangement::Parallel { reach };
-        Self { arrangement, ..Self::perspective(center, axes, half, size) }
+        Self {
+            arrangement,
+            ..Self::perspective(center, axes, half, size)
+        }
     }
 
     /// The same rays on a raster of `size` that shows only the window from `min` to `max` of this raster.
@@ -114,8 +117,14 @@ impl View {
         let offset = self.right * ((x - cx) / self.scale_x) + self.up * ((cy - y) / self.scale_y);
         let center = self.center.as_dvec3();
         match self.arrangement {
-            Arrangement::Perspective => ViewRay { origin: center, dir: self.forward + offset },
-            Arrangement::Parallel { .. } => ViewRay { origin: center + offset, dir: self.forward },
+            Arrangement::Perspective => ViewRay {
+                origin: center,
+                dir: self.forward + offset,
+            },
+            Arrangement::Parallel { .. } => ViewRay {
+                origin: center + offset,
+                dir: self.forward,
+            },
         }
     }
 
@@ -137,7 +146,10 @@ impl View {
         let [cx, cy] = self.middle;
         let x = a.dot(self.right) * self.scale_x + cx * w;
         let y = cy * w - a.dot(self.up) * self.scale_y;
-        Homogeneous { p: DVec3::new(x, y, w), m }
+        Homogeneous {
+            p: DVec3::new(x, y, w),
+            m,
+        }
     }
 
     /// Nearness of a depth.

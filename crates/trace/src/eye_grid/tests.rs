@@ -11,10 +11,13 @@ fn brute(triangles: &Triangles, ray: &ViewRay) -> Option<u32> {
     let hits = (0..triangles.len() as u32).filter_map(|prim| {
         let corners = triangles.corners(prim);
         let finite = corners.iter().all(|c| c.is_finite());
-        let hit = finite.then(|| exact::hit(ray.origin, ray.dir, corners)).flatten()?;
+        let hit = finite
+            .then(|| exact::hit(ray.origin, ray.dir, corners))
+            .flatten()?;
         (hit.t > 0.0).then_some((hit.t, prim))
     });
-    hits.reduce(|a, b| if b.0 < a.0 { b } else { a }).map(|(_, prim)| prim)
+    hits.reduce(|a, b| if b.0 < a.0 { b } else { a })
+        .map(|(_, prim)| prim)
 }
 
 fn check(name: &str, mesh: &Mesh, view: View, options: EyeGridOptions) -> (usize, usize) {
@@ -38,7 +41,12 @@ fn check(name: &str, mesh: &Mesh, view: View, options: EyeGridOptions) -> (usize
                     let (px, py) = (tile.x + x, tile.y + y);
                     let want = expected[(py * view.width + px) as usize];
                     let got = hits.prim(x, y);
-                    assert_eq!(got, want, "{name}, {}, {options:?}, pixel {px} {py}", level.name());
+                    assert_eq!(
+                        got,
+                        want,
+                        "{name}, {}, {options:?}, pixel {px} {py}",
+                        level.name()
+                    );
                 }
             }
         }
@@ -50,29 +58,74 @@ fn check(name: &str, mesh: &Mesh, view: View, options: EyeGridOptions) -> (usize
 fn check_both(name: &str, mesh: &Mesh, view: View) {
     let (covered, exact) = check(name, mesh, view, EyeGridOptions::default());
     println!("{name}: {covered} pixels covered, {exact} decided exactly");
-    check(name, mesh, view, EyeGridOptions { tile: 20, binning: Binning::Rectangle });
+    check(
+        name,
+        mesh,
+        view,
+        EyeGridOptions {
+            tile: 20,
+            binning: Binning::Rectangle,
+        },
+    );
 }
 
 #[test]
 fn equals_brute_force_from_outside_inside_and_within() {
     let size = [97, 61];
     let soup = Mesh::soup(1, 300, 0.3, 1.0);
-    check_both("soup outside", &soup, looking(Vec3::new(2.0, 1.0, 3.0), Vec3::ZERO, 0.5, size));
-    check_both("soup inside", &soup, looking(Vec3::new(0.1, 0.1, 0.1), Vec3::X, 1.0, size));
+    check_both(
+        "soup outside",
+        &soup,
+        looking(Vec3::new(2.0, 1.0, 3.0), Vec3::ZERO, 0.5, size),
+    );
+    check_both(
+        "soup inside",
+        &soup,
+        looking(Vec3::new(0.1, 0.1, 0.1), Vec3::X, 1.0, size),
+    );
     let blob = Mesh::blob(24);
-    check_both("blob outside", &blob, looking(Vec3::new(0.5, 1.5, 3.0), Vec3::ZERO, 0.5, size));
-    check_both("blob inside", &blob, looking(Vec3::new(0.05, 0.0, 0.1), Vec3::NEG_X, 2.0, size));
+    check_both(
+        "blob outside",
+        &blob,
+        looking(Vec3::new(0.5, 1.5, 3.0), Vec3::ZERO, 0.5, size),
+    );
+    check_both(
+        "blob inside",
+        &blob,
+        looking(Vec3::new(0.05, 0.0, 0.1), Vec3::NEG_X, 2.0, size),
+    );
     let fine = Mesh::blob(60);
-    check_both("tiny triangles", &fine, looking(Vec3::new(0.5, 1.5, 9.0), Vec3::ZERO, 0.5, size));
+    check_both(
+        "tiny triangles",
+        &fine,
+        looking(Vec3::new(0.5, 1.5, 9.0), Vec3::ZERO, 0.5, size),
+    );
 }
 
 #[test]
 fn equals_brute_force_on_awkward_triangles() {
     let mesh = Mesh::awkward();
     let size = [64, 64];
-    check_both("awkward", &mesh, looking(Vec3::new(0.3, 0.2, 2.5), Vec3::ZERO, 0.4, size));
-    check_both("awkward, low", &mesh, looking(Vec3::new(0.0, -0.79999, 2.5), Vec3::new(0.0, -0.7, 0.0), 0.7, size));
-    check_both("on a plane", &mesh, looking(Vec3::new(0.3, -0.8, 2.5), Vec3::new(0.3, -0.8, 0.0), 0.7, size));
+    check_both(
+        "awkward",
+        &mesh,
+        looking(Vec3::new(0.3, 0.2, 2.5), Vec3::ZERO, 0.4, size),
+    );
+    check_both(
+        "awkward, low",
+        &mesh,
+        looking(
+            Vec3::new(0.0, -0.79999, 2.5),
+            Vec3::new(0.0, -0.7, 0.0),
+            0.7,
+            size,
+        ),
+    );
+    check_both(
+        "on a plane",
+        &mesh,
+        looking(Vec3::new(0.3, -0.8, 2.5), Vec3::new(0.3, -0.8, 0.0), 0.7, size),
+    );
     // Rays along lattice directions of a lattice mesh pass exactly through vertices and edges.
     let mut lattice = Mesh::default();
     for i in 0..16 {
@@ -112,7 +165,13 @@ fn equals_brute_force_in_parallel_views() {
     let soup = Mesh::soup(2, 300, 0.3, 1.0);
     for direction in [DVec3::new(1.0, -2.0, 0.5), DVec3::NEG_Z] {
         let axes = axes(direction);
-        let view = View::parallel((direction.normalize() * -4.0).as_vec3(), axes, [1.5, 1.2], 40.0, [80, 64]);
+        let view = View::parallel(
+            (direction.normalize() * -4.0).as_vec3(),
+            axes,
+            [1.5, 1.2],
+            40.0,
+            [80, 64],
+        );
         check_both("parallel", &soup, view);
         let within = View::parallel(Vec3::ZERO, axes, [1.5, 1.2], 40.0, [80, 64]);
         check_both("parallel, from within", &soup, within);
@@ -121,5 +180,9 @@ fn equals_brute_force_in_parallel_views() {
 
 #[test]
 fn empty_input_gives_empty_tiles() {
-    check_both("empty", &Mesh::default(), looking(Vec3::Z, Vec3::ZERO, 0.5, [20, 20]));
+    check_both(
+        "empty",
+        &Mesh::default(),
+        looking(Vec3::Z, Vec3::ZERO, 0.5, [20, 20]),
+    );
 }

@@ -65,7 +65,13 @@ pub(crate) struct VertexLanes {
 impl Default for VertexLanes {
     fn default() -> Self {
         let zero = [[0.0; LANES]; 3];
-        Self { x: zero, y: zero, nearness: zero, prim: [u32::MAX; LANES], count: 0 }
+        Self {
+            x: zero,
+            y: zero,
+            nearness: zero,
+            prim: [u32::MAX; LANES],
+            count: 0,
+        }
     }
 }
 

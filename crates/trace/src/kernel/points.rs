@@ -28,7 +28,12 @@ pub(crate) struct PointLanes {
 
 impl Default for PointLanes {
     fn default() -> Self {
-        Self { x: [0.0; LANES], y: [0.0; LANES], nearness: [0.0; LANES], own: [0; LANES] }
+        Self {
+            x: [0.0; LANES],
+            y: [0.0; LANES],
+            nearness: [0.0; LANES],
+            own: [0; LANES],
+        }
     }
 }
 

@@ -46,8 +46,16 @@ fn project_impl<S: Simd>(
     out: &mut [RasterVertex],
 ) {
     let range = first..first + out.len();
-    let (xs, ys, zs) = (&triangles.x[range.clone()], &triangles.y[range.clone()], &triangles.z[range]);
-    let chunks = out.chunks_mut(LANES).zip(xs.chunks(LANES)).zip(ys.chunks(LANES)).zip(zs.chunks(LANES));
+    let (xs, ys, zs) = (
+        &triangles.x[range.clone()],
+        &triangles.y[range.clone()],
+        &triangles.z[range],
+    );
+    let chunks = out
+        .chunks_mut(LANES)
+        .zip(xs.chunks(LANES))
+        .zip(ys.chunks(LANES))
+        .zip(zs.chunks(LANES));
     for (((out, x), y), z) in chunks {
         let vertices = if out.len() == LANES {
             let load = |s: &[f32]| f32x16::from_slice(simd, s);
@@ -58,7 +66,12 @@ fn project_impl<S: Simd>(
         };
         let [x, y, nearness] = vertices.map(|v| <[f32; LANES]>::from(v));
         for (i, vertex) in out.iter_mut().enumerate() {
-            *vertex = RasterVertex { x: x[i], y: y[i], nearness: nearness[i], padding: 0.0 };
+            *vertex = RasterVertex {
+                x: x[i],
+                y: y[i],
+                nearness: nearness[i],
+                padding: 0.0,
+            };
         }
     }
 }
@@ -85,7 +98,11 @@ pub(crate) fn project_lanes<S: Simd>(simd: S, view: &View, points: [f32x16<S>; 3
 fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
     let splat = |v: f64| f64x8::splat(simd, v);
     let center = view.center.as_dvec3();
-    let a = [points[0] - splat(center.x), points[1] - splat(center.y), points[2] - splat(center.z)];
+    let a = [
+        points[0] - splat(center.x),
+        points[1] - splat(center.y),
+        points[2] - splat(center.z),
+    ];
     let dot = |axis: glam::DVec3| a[0] * splat(axis.x) + a[1] * splat(axis.y) + a[2] * splat(axis.z);
     let (along, above, depth) = (dot(view.right), dot(view.up), dot(view.forward));
     let [cx, cy] = view.middle;

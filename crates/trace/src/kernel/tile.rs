@@ -124,7 +124,11 @@ fn draw_impl<S: Simd>(simd: S, tile: &mut TileBuffer, record: &EdgeRecord, rect:
     let lane_y = f32x16::from_fn(simd, |i| (i / BLOCK as usize) as f32 + 0.5);
     let base = |a: f32, b: f32, c: f32| splat(a).mul_add(lane_x, splat(b).mul_add(lane_y, splat(c)));
     let EdgeRecord { a, b, c, .. } = *record;
-    let base_edges = [base(a[0], b[0], c[0]), base(a[1], b[1], c[1]), base(a[2], b[2], c[2])];
+    let base_edges = [
+        base(a[0], b[0], c[0]),
+        base(a[1], b[1], c[1]),
+        base(a[2], b[2], c[2]),
+    ];
     let base_nearness = base(record.nearness_x, record.nearness_y, record.nearness);
     let (nearer, farther) = (splat(1.0 - NEARNESS_BAND), splat(1.0 + NEARNESS_BAND));
 
@@ -150,12 +154,20 @@ fn draw_impl<S: Simd>(simd: S, tile: &mut TileBuffer, record: &EdgeRecord, rect:
             }
             let sure = inside.simd_gt(splat(1.0)) & (nearness * nearer).simd_gt(stored) & !vague & possible;
             let unsure = (possible & !sure).to_bitmask() as u32;
-            sure.select(nearness, stored).store_slice(&mut tile.nearness[block]);
+            sure.select(nearness, stored)
+                .store_slice(&mut tile.nearness[block]);
             let prim = u32x16::from_slice(simd, &tile.prim[block]);
-            sure.select(u32x16::splat(simd, record.prim), prim).store_slice(&mut tile.prim[block]);
+            sure.select(u32x16::splat(simd, record.prim), prim)
+                .store_slice(&mut tile.prim[block]);
             if unsure != 0 {
                 let at_most = vague.select(splat(f32::INFINITY), nearness * farther);
-                note_unsure(&mut tile.unsure, block as u32, unsure, record.prim, at_most.into());
+                note_unsure(
+                    &mut tile.unsure,
+                    block as u32,
+                    unsure,
+                    record.prim,
+                    at_most.into(),
+                );
             }
         }
     }
@@ -166,6 +178,11 @@ fn note_unsure(list: &mut Vec<Unsure>, block: u32, mut lanes: u32, prim: u32, at
     while lanes != 0 {
         let lane = lanes.trailing_zeros();
         lanes &= lanes - 1;
-        list.push(Unsure { block, lane, prim, at_most: at_most[lane as usize] });
+        list.push(Unsure {
+            block,
+            lane,
+            prim,
+            at_most: at_most[lane as usize],
+        });
     }
 }

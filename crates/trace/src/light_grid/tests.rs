@@ -26,7 +26,8 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: Ca
     let triangles = mesh.triangles();
     let in_shadow = |r: &Receiver| {
         (0..triangles.len() as u32).any(|prim| {
-            triangles.corners(prim).iter().all(|c| c.is_finite()) && exact::shadows(&triangles, prim, r, &light)
+            triangles.corners(prim).iter().all(|c| c.is_finite())
+                && exact::shadows(&triangles, prim, r, &light)
         })
     };
     let expected: Vec<bool> = receivers.iter().map(in_shadow).collect();
@@ -39,7 +40,12 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: Ca
             grid.shadowed(receivers, &mut scratch, &mut shadow);
             for (i, (got, want)) in shadow.iter().zip(&expected).enumerate() {
                 let receiver = &receivers[i];
-                assert_eq!(got, want, "{name}, {}, {light:?}, {options:?}, {receiver:?}", level.name());
+                assert_eq!(
+                    got,
+                    want,
+                    "{name}, {}, {light:?}, {options:?}, {receiver:?}",
+                    level.name()
+                );
             }
             counts = scratch.counts;
         }
@@ -62,9 +68,11 @@ fn lights() -> Vec<Light> {
 #[test]
 fn equals_brute_force_with_casters_of_both_sides() {
     let eye = Vec3::new(0.2, 0.5, 2.5);
-    for (name, mesh) in
-        [("soup", Mesh::soup(3, 400, 0.3, 1.0)), ("blob", Mesh::blob(24)), ("awkward", Mesh::awkward())]
-    {
+    for (name, mesh) in [
+        ("soup", Mesh::soup(3, 400, 0.3, 1.0)),
+        ("blob", Mesh::blob(24)),
+        ("awkward", Mesh::awkward()),
+    ] {
         for eye in [eye, Vec3::new(0.1, 0.05, 0.0)] {
             let receivers = receivers(&mesh, eye, 400, 11);
             for light in lights() {
@@ -82,7 +90,13 @@ fn equals_brute_force_at_any_scale_and_offset() {
         let receivers = receivers(&mesh, Vec3::new(0.2, 0.5, 2.5) * scale + offset, 300, 5);
         for position in [Vec3::new(2.0, 3.0, 1.0), Vec3::new(0.1, 0.1, 0.0)] {
             let light = Light::Point(position * scale + offset);
-            check(&format!("scale {scale} offset {offset}"), &mesh, &receivers, light, &|_| Casts::Both);
+            check(
+                &format!("scale {scale} offset {offset}"),
+                &mesh,
+                &receivers,
+                light,
+                &|_| Casts::Both,
+            );
         }
     }
 }
@@ -92,7 +106,10 @@ fn back_faces_suffice_for_what_an_outside_viewer_sees() {
     let mesh = Mesh::blob(24);
     let triangles = mesh.triangles();
     let eye = Vec3::new(0.2, 0.5, 2.5);
-    for light in lights().into_iter().filter(|l| *l != Light::Point(Vec3::new(0.05, 0.02, -0.03))) {
+    for light in lights()
+        .into_iter()
+        .filter(|l| *l != Light::Point(Vec3::new(0.05, 0.02, -0.03)))
+    {
         // Receivers on the side turned away from the light are dark without a ray, so nobody asks about them.
         let mut receivers = receivers(&mesh, eye, 3000, 17);
         receivers.retain(|r| {
@@ -105,7 +122,10 @@ fn back_faces_suffice_for_what_an_outside_viewer_sees() {
         let inside = matches!(light, Light::Point(p) if p.length() < 1.1);
         if !inside {
             let counts = check("blob", &mesh, &receivers, light, &|_| Casts::Back);
-            assert!(counts.receivers > 100, "too few receivers to mean anything: {counts:?}");
+            assert!(
+                counts.receivers > 100,
+                "too few receivers to mean anything: {counts:?}"
+            );
         }
     }
 }
@@ -119,7 +139,10 @@ fn a_convex_surface_never_shadows_its_lit_side() {
         (mesh.x[i], mesh.y[i], mesh.z[i]) = (p.x, p.y, p.z);
     }
     let triangles = mesh.triangles();
-    for light in [Light::Point(Vec3::new(2.0, 3.0, 1.0)), Light::Directional(Vec3::new(1.0, 0.5, 0.2))] {
+    for light in [
+        Light::Point(Vec3::new(2.0, 3.0, 1.0)),
+        Light::Directional(Vec3::new(1.0, 0.5, 0.2)),
+    ] {
         let mut receivers = receivers(&mesh, Vec3::new(0.0, 0.3, 2.5), 4000, 23);
         receivers.retain(|r| {
             let outward = |n: DVec3| n * n.dot(r.point).signum();
@@ -145,11 +168,17 @@ fn a_spot_lights_cone_is_one_face() {
     let triangles = mesh.triangles();
     let position = Vec3::new(0.1, 2.5, 0.2);
     let axis = DVec3::new(0.1, -1.0, 0.05).normalize();
-    let cone = Cone { axis, half_angle: 0.5 };
+    let cone = Cone {
+        axis,
+        half_angle: 0.5,
+    };
     let mut receivers = receivers(&mesh, Vec3::new(0.2, 0.5, 2.5), 600, 29);
     receivers.retain(|r| (r.point - position.as_dvec3()).angle_between(axis) < 0.5);
     let light = Light::Point(position);
-    let options = LightGridOptions { cone: Some(cone), ..LightGridOptions::default() };
+    let options = LightGridOptions {
+        cone: Some(cone),
+        ..LightGridOptions::default()
+    };
     let grid = PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
     assert_eq!(grid.faces.len(), 1);
     let mut shadow = Vec::new();
@@ -168,7 +197,11 @@ fn nothing_and_nonsense_shadow_nothing() {
         check("empty", &mesh, &receivers, light, &|_| Casts::Both);
     }
     let soup = Mesh::soup(1, 20, 0.3, 1.0);
-    for light in [Light::Point(Vec3::NAN), Light::Directional(Vec3::ZERO), Light::Directional(Vec3::NAN)] {
+    for light in [
+        Light::Point(Vec3::NAN),
+        Light::Directional(Vec3::ZERO),
+        Light::Directional(Vec3::NAN),
+    ] {
         check("nonsense", &soup, &receivers, light, &|_| Casts::Both);
     }
 }

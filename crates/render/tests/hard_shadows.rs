@@ -1,0 +1,211 @@
+//! Whole pictures with hard shadows against brute force: every pixel's colour and id, bit for bit.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use rayward::scene::{FrameGeometry, LightKind, PosedCamera, PosedLight, Scene, builtin};
+use rayward::shade::{ambient, direct, object_of};
+use rayward::trace::{Accel, BruteForce, Light, Ray, Receiver, SimdLevel, Triangles, View, exact};
+use rayward::{
+    CameraFrame, CasterPolicy, Film, Layers, NO_ID, RenderOptions, Renderer, Shader, ShadingLight,
+    SurfacePoint,
+};
+
+fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
+    Triangles::new(&geometry.x, &geometry.y, &geometry.z, &geometry.indices)
+}
+
+/// The closest triangle on a ray whose direction is f64, by testing all.
+fn closest(triangles: &Triangles, origin: DVec3, dir: DVec3) -> Option<(u32, f64)> {
+    (0..triangles.len() as u32)
+        .filter_map(|prim| Some((prim, exact::hit(origin, dir, triangles.corners(prim))?.t)))
+        .filter(|hit| hit.1 > 0.0)
+        .reduce(|a, b| if b.1 < a.1 { b } else { a })
+}
+
+/// Colour and id of one pixel by brute force.
+fn reference_pixel(
+    scene: &Shader,
+    geometry: &FrameGeometry,
+    camera: &CameraFrame,
+    lights: &[PosedLight],
+    options: &RenderOptions,
+    [x, y]: [u32; 2],
+) -> (Vec3, u32) {
+    let triangles = triangles(geometry);
+    let half = [
+        camera.step_x.length() * 0.5 * f64::from(camera.width),
+        camera.step_y.length() * 0.5 * f64::from(camera.height),
+    ];
+    let axes = [camera.right, camera.up, camera.forward];
+    let ray = View::perspective(camera.eye, axes, half, [camera.width, camera.height]).pixel_ray(x, y);
+    let Some((prim, t)) = closest(&triangles, ray.origin, ray.dir) else {
+        return (options.background, NO_ID);
+    };
+    let hit = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)).expect("it was hit");
+    let point = SurfacePoint {
+        prim,
+        object: object_of(geometry, prim),
+        u: hit.u as f32,
+        v: hit.v as f32,
+        view: (-ray.dir.normalize()).as_vec3(),
+        footprint: camera.footprint(t as f32),
+    };
+    let surface = scene.surface(geometry, &point);
+    let eye_ray = Ray::new(camera.eye, ray.dir.as_vec3());
+    let receiver = Receiver {
+        point: ray.origin + ray.dir * t,
+        ..Receiver::on_surface(&eye_ray, t, prim)
+    };
+    let mut color = ambient(&surface, options.ambient);
+    for light in lights {
+        let Some(incident) = direct(&surface, &ShadingLight::new(light, geometry.origin)) else {
+            continue;
+        };
+        let end = match light.kind {
+            LightKind::Directional { .. } => Light::Directional((-light.direction).as_vec3()),
+            _ => Light::Point((light.position - geometry.origin).as_vec3()),
+        };
+        if !BruteForce::new(triangles).shadowed(&receiver, &end) {
+            color += incident.radiance;
+        }
+    }
+    (color, prim)
+}
+
+fn render(
+    scene: &Scene,
+    geometry: &FrameGeometry,
+    camera: &PosedCamera,
+    lights: &[PosedLight],
+    options: &RenderOptions,
+) -> Film {
+    Renderer::new(scene)
+        .render(geometry, camera, lights, options, &|_| ())
+        .expect("valid input")
+        .film
+}
+
+fn check(name: &str, time: f32, size: [u32; 2], alter: impl Fn(&mut FrameGeometry)) {
+    let scene = builtin::build(name).expect("it exists");
+    let mut geometry = scene.at(time);
+    alter(&mut geometry);
+    let camera = geometry.cameras[0].clone();
+    let options = RenderOptions {
+        width: size[0],
+        height: size[1],
+        layers: Layers {
+            prim: true,
+            ..Layers::default()
+        },
+        ..RenderOptions::default()
+    };
+    let frame = CameraFrame::new(&camera, geometry.origin, size[0], size[1]).expect("valid camera");
+    let shader = Shader::new(&scene);
+    let expected: Vec<(Vec3, u32)> = (0..size[0] * size[1])
+        .into_par_iter()
+        .map(|i| {
+            reference_pixel(
+                &shader,
+                &geometry,
+                &frame,
+                &geometry.lights,
+                &options,
+                [i % size[0], i / size[0]],
+            )
+        })
+        .collect();
+    for level in SimdLevel::available() {
+        for casters in [CasterPolicy::Auto, CasterPolicy::Both] {
+            let options = RenderOptions {
+                level,
+                casters,
+                ..options
+            };
+            let film = render(&scene, &geometry, &camera, &geometry.lights, &options);
+            for (i, (color, prim)) in expected.iter().enumerate() {
+                let place = [i as u32 % size[0], i as u32 / size[0]];
+                assert_eq!(
+                    film.prim[i],
+                    *prim,
+                    "{name}, {}, {casters:?}, pixel {place:?}",
+                    level.name()
+                );
+                assert_eq!(
+                    film.color[i],
+                    *color,
+                    "{name}, {}, {casters:?}, pixel {place:?}",
+                    level.name()
+                );
+            }
+            assert!(
+                film.prim.iter().any(|p| *p != NO_ID),
+                "{name}: an empty picture proves nothing"
+            );
+        }
+    }
+}
+
+#[test]
+fn closed_models() {
+    check("blob-1k", 0.0, [80, 60], |_| ());
+    check("blob-4k", 0.0, [64, 48], |_| ());
+}
+
+#[test]
+fn rooms_and_figures() {
+    check("office", 0.0, [96, 64], |_| ());
+    check("walker", 0.3, [64, 64], |_| ());
+    check("teapot-mirror", 0.0, [48, 32], |_| ());
+}
+
+#[test]
+fn many_parts() {
+    check("courtyard", 1.0, [48, 32], |_| ());
+}
+
+#[test]
+fn an_eye_inside_of_a_closed_model() {
+    // From within, the surface is a room: back faces alone would not do.
+    for light_inside in [true, false] {
+        check("blob-1k", 0.0, [48, 32], |geometry| {
+            let (low, high) = geometry.bounds().expect("triangles");
+            let at = |share: f32| geometry.origin + low.lerp(high, share).as_dvec3();
+            let (eye, light) = (at(0.45), at(0.5));
+            geometry.cameras[0].eye = eye;
+            if light_inside {
+                geometry.lights[0].kind = LightKind::Point { radius: 0.0 };
+                geometry.lights[0].position = light;
+                geometry.lights[0].power = Vec3::splat(1.0);
+            }
+            geometry.lights.truncate(1);
+        });
+    }
+}
+
+#[test]
+fn one_and_two_threads_give_the_same_bits() {
+    let scene = builtin::build("courtyard").expect("it exists");
+    let geometry = scene.at(0.5);
+    let options = RenderOptions {
+        width: 320,
+        height: 200,
+        layers: Layers::ALL,
+        ..RenderOptions::default()
+    };
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        pool.install(|| {
+            render(
+                &scene,
+                &geometry,
+                &geometry.cameras[0],
+                &geometry.lights,
+                &options,
+            )
+        })
+    };
+    assert!(on(1) == on(2));
+}
