@@ -1,2 +1,67 @@
-//! placeholder
-fn main(){}
+//! The `rayward` command: pictures from scene files, what is in them, and how pictures differ.
+//!
+//! Data goes to standard output, all else to standard error; nothing but this program prints. Every way to end
+//! has its exit code, see [`failure::Code`].
+
+mod args;
+mod compare;
+mod doctor;
+mod failure;
+mod info;
+mod input;
+mod interrupt;
+mod machine;
+mod output;
+mod progress;
+mod render;
+mod report;
+mod summary;
+mod values;
+mod view;
+
+use std::process::ExitCode;
+
+use clap::{CommandFactory, Parser};
+
+use args::{Cli, Command};
+use failure::{Code, Failure};
+
+fn main() -> ExitCode {
+    interrupt::install();
+    let result = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        Err(error) => usage(&error),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.say();
+            failure.code.into()
+        }
+    }
+}
+
+fn run(command: Command) -> Result<(), Failure> {
+    match command {
+        Command::Render(args) => render::run(&args),
+        Command::Info(args) => info::run(&args),
+        Command::Compare(args) => compare::run(&args),
+        Command::Doctor(args) => doctor::run(&args),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "rayward", &mut script);
+            report::to_stdout(&script)
+        }
+    }
+}
+
+/// Help and version are data; everything else the parser has to say is a usage error in this program's form.
+fn usage(error: &clap::Error) -> Result<(), Failure> {
+    let text = error.render();
+    if !error.use_stderr() {
+        return report::to_stdout(text.to_string().as_bytes());
+    }
+    let text = text.to_string();
+    let message = text.trim_end().strip_prefix("error: ").unwrap_or(&text);
+    Err(Failure::lines(Code::Usage, message))
+}

@@ -1,0 +1,266 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Parser, Subcommand};
+use clap_complete::Shell;
+use glam::{DVec3, Vec3};
+use rayward::scene::builtin;
+
+use crate::values::{self, Casters, LayerName, LightValue, Operator, Size, Up};
+
+const HELP: &str = "\
+Examples:
+  rayward render                                  the built-in scene `courtyard` to rayward.png
+  rayward render model.glb -o model.png           a picture of a file
+  rayward info model.glb                          what is in it
+  rayward compare before.png after.png            exit code 5 if they differ
+
+Exit codes:
+  0    done
+  1    runtime failure, for instance an output that cannot be written
+  2    usage: the command line makes no sense
+  3    an input cannot be read, is malformed or not supported
+  4    an input or a picture is over a limit
+  5    compare: the pictures differ by more than is tolerated
+  130  interrupted by Ctrl-C; no file is left unfinished";
+
+const RENDER_HELP: &str = "\
+Coordinates are those of the scene as it is rendered: metres, right-handed, +Y up.
+
+Examples:
+  rayward render
+  rayward render --builtin forest --time 1.5 --resolution 1280x720 -o forest.png
+  rayward render part.stl --up z --scale 0.001 -o part.png
+  rayward render city.glb --camera-position 40,30,60 --light sun:1,2,1 -o city.png
+  rayward render model.glb --layers depth,normal -o model.exr
+  rayward render model.glb --npy layers --json > summary.json
+  rayward render model.glb -o - | display";
+
+/// Pictures of scenes, ray traced on the CPU: one structure for every camera and light, rebuilt every frame
+#[derive(Debug, Parser)]
+#[command(name = "rayward", version, arg_required_else_help = true, after_help = HELP)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render a scene to a picture
+    Render(Box<RenderArgs>),
+    /// Say what is in a scene, and what of it will be skipped
+    Info(InfoArgs),
+    /// Compare two pictures of the same size
+    Compare(CompareArgs),
+    /// Say what this build uses of this machine, and test that it works
+    Doctor(DoctorArgs),
+    /// Print a completion script for a shell
+    Completions {
+        /// The shell
+        shell: Shell,
+    },
+}
+
+/// Where the scene comes from.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Scene")]
+pub(crate) struct SourceArgs {
+    /// Scene file: .glb, .gltf, .obj, .ply or .stl
+    pub(crate) scene: Option<PathBuf>,
+    /// A built-in scene instead of a file
+    #[arg(long, value_name = "NAME", conflicts_with = "scene",
+        value_parser = PossibleValuesParser::new(builtin::NAMES))]
+    pub(crate) builtin: Option<String>,
+    /// The file's up axis
+    #[arg(long, value_name = "AXIS", default_value = "y", requires = "scene")]
+    pub(crate) up: Up,
+    /// Metres per unit of the file
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = values::positive, requires = "scene")]
+    pub(crate) scale: f64,
+}
+
+/// Which moment of the scene.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Scene")]
+pub(crate) struct MomentArgs {
+    /// Moment of the animation in seconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = values::single,
+        allow_hyphen_values = true)]
+    pub(crate) time: f32,
+    /// Which animation plays, from 0; the first unless given
+    #[arg(long, value_name = "INDEX")]
+    pub(crate) animation: Option<usize>,
+}
+
+/// Camera and lights.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Camera and lights")]
+pub(crate) struct ViewArgs {
+    /// A camera of the scene by name or index; the first unless given
+    #[arg(long, value_name = "NAME|INDEX", conflicts_with_all = ["camera_file", "camera_position"])]
+    pub(crate) camera: Option<String>,
+    /// Camera and light from a JSON file of entries by scene; its point light is used, or else its area light
+    #[arg(long, value_name = "FILE", conflicts_with = "camera_position")]
+    pub(crate) camera_file: Option<PathBuf>,
+    /// The entry of the camera file; the one of the scene's file unless given
+    #[arg(long, value_name = "NAME", requires = "camera_file")]
+    pub(crate) camera_entry: Option<String>,
+    /// Place of the camera, x,y,z
+    #[arg(long, value_name = "POINT", value_parser = values::vector, allow_hyphen_values = true)]
+    pub(crate) camera_position: Option<DVec3>,
+    /// Point that the camera looks at; the middle of the scene unless given
+    #[arg(long, value_name = "POINT", value_parser = values::vector, allow_hyphen_values = true,
+        requires = "camera_position")]
+    pub(crate) camera_target: Option<DVec3>,
+    /// Direction that is up in the picture
+    #[arg(long, value_name = "DIRECTION", value_parser = values::direction, allow_hyphen_values = true,
+        requires = "camera_position", default_value = "0,1,0")]
+    pub(crate) camera_up: DVec3,
+    /// Full vertical field of view in degrees, for whichever camera is used
+    #[arg(long, value_name = "DEGREES", value_parser = values::field_of_view)]
+    pub(crate) camera_vfov: Option<f64>,
+    /// A light instead of the scene's, repeatable: point:x,y,z[:candela] stands there, sun:x,y,z[:lux] shines
+    /// from that direction. Without an intensity, a white matt surface in the middle of the scene shows
+    /// radiance 1
+    #[arg(long = "light", value_name = "LIGHT", value_parser = values::light)]
+    pub(crate) lights: Vec<LightValue>,
+}
+
+/// `rayward render`
+#[derive(Debug, Args)]
+#[command(after_help = RENDER_HELP)]
+pub(crate) struct RenderArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceArgs,
+    #[command(flatten)]
+    pub(crate) moment: MomentArgs,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    #[command(flatten)]
+    pub(crate) target: TargetArgs,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// How the picture is made.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub(crate) struct PictureArgs {
+    /// Width in pixels; follows from the height at 16:9, or is 1920
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) width: Option<u32>,
+    /// Height in pixels; follows from the width at 16:9, or is 1080
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) height: Option<u32>,
+    /// Width and height in one
+    #[arg(long, value_name = "WxH", value_parser = values::size, conflicts_with_all = ["width", "height"])]
+    pub(crate) resolution: Option<Size>,
+    /// Lights cast no shadows
+    #[arg(long)]
+    pub(crate) no_shadows: bool,
+    /// Which sides of triangles cast shadows
+    #[arg(long, value_name = "SIDES", default_value = "auto", conflicts_with = "paper")]
+    pub(crate) casters: Casters,
+    /// From linear colour to what is displayed, for PNG; `none`, or `exposure` where --exposure is given
+    #[arg(long, value_name = "OPERATOR")]
+    pub(crate) tone_map: Option<Operator>,
+    /// Photographic stops, for the tone maps exposure and aces
+    #[arg(long, value_name = "STOPS", value_parser = values::single, allow_hyphen_values = true)]
+    pub(crate) exposure: Option<f32>,
+    /// Linear colour where nothing is seen, r,g,b
+    #[arg(long, value_name = "COLOR", value_parser = values::color)]
+    pub(crate) background: Option<Vec3>,
+    /// Linear colour of the light from all around, r,g,b
+    #[arg(long, value_name = "COLOR", value_parser = values::color)]
+    pub(crate) ambient: Option<Vec3>,
+    /// The literal parameters of Hunt and Mark 2008: 100x100 tiles, 200x200 light grids, binning by bounding
+    /// rectangle, back faces alone as casters
+    #[arg(long)]
+    pub(crate) paper: bool,
+}
+
+/// Where the picture goes.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct TargetArgs {
+    /// File to write, by its ending: .png, .exr (linear, with layers), .npy (linear colour); - is PNG to
+    /// standard output. It is rayward.png unless given here or by --npy
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Folder for one NumPy array a layer: color.npy, depth.npy and so on
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) npy: Option<PathBuf>,
+    /// Layers for .exr and --npy besides the colour; all unless given
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
+    pub(crate) layers: Vec<LayerName>,
+}
+
+/// How the program runs.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Run")]
+pub(crate) struct RunArgs {
+    /// Worker threads; one for each core unless given. The picture does not depend on it
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub(crate) threads: Option<u32>,
+    /// Instruction set: one that `rayward doctor` lists; the best unless given. The picture does not depend on it
+    #[arg(long, value_name = "LEVEL")]
+    pub(crate) simd: Option<String>,
+    /// The summary as one JSON object on standard output
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Nothing but errors on standard error
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
+}
+
+/// `rayward info`
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceArgs,
+    #[command(flatten)]
+    pub(crate) moment: MomentArgs,
+    /// One JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `rayward compare`
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    /// The reference: PNG, JPEG, EXR, HDR, NPY or PFM
+    pub(crate) a: PathBuf,
+    /// The picture compared with it
+    pub(crate) b: PathBuf,
+    /// Largest mean FLIP (0 equal to 1) that passes; without it no pixel may differ
+    #[arg(long, value_name = "FLIP", value_parser = values::not_negative)]
+    pub(crate) tolerance: Option<f64>,
+    /// PNG to write with the FLIP of every pixel: black where equal, pale yellow where different
+    #[arg(long, value_name = "FILE")]
+    pub(crate) difference: Option<PathBuf>,
+    /// One JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// `rayward doctor`
+#[derive(Debug, Args)]
+pub(crate) struct DoctorArgs {
+    /// One JSON object
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::Cli::command().debug_assert();
+    }
+}

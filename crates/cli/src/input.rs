@@ -1,0 +1,116 @@
+//! From the command line to a posed scene.
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use rayward::scene::{self, FrameGeometry, LoadOptions, Scene, builtin};
+
+use crate::args::{MomentArgs, SourceArgs};
+use crate::failure::{Code, Failure};
+use crate::machine;
+
+/// A scene as it was read.
+pub(crate) struct Input {
+    pub(crate) scene: Scene,
+    /// The file, or the built-in's name.
+    pub(crate) path: PathBuf,
+    /// Whether it is a built-in scene.
+    pub(crate) builtin: bool,
+    /// Time to read or make it.
+    pub(crate) load: Duration,
+}
+
+impl Input {
+    /// Reads the file or makes the built-in scene.
+    pub(crate) fn read(source: &SourceArgs) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let (scene, path) = match &source.scene {
+            Some(path) => {
+                let options = LoadOptions {
+                    up: source.up.into(),
+                    scale: source.scale,
+                };
+                (scene::load(path, &options)?, path.clone())
+            }
+            None => {
+                let name = source.builtin.as_deref().unwrap_or(builtin::NAMES[0]);
+                (builtin::build(name)?, PathBuf::from(name))
+            }
+        };
+        Ok(Self {
+            scene,
+            path,
+            builtin: source.scene.is_none(),
+            load: start.elapsed(),
+        })
+    }
+
+    /// Poses the scene, if it is not too large to be posed.
+    pub(crate) fn pose(&self, moment: &MomentArgs) -> Result<FrameGeometry, Failure> {
+        self.check_size()?;
+        let animations = self.scene.animations.len();
+        if let Some(index) = moment.animation.filter(|&index| index >= animations) {
+            let problem = match animations {
+                0 => "has no animation".into(),
+                1 => "has only animation 0".into(),
+                _ => format!("has only the animations 0 to {}", animations - 1),
+            };
+            return Err(Failure::new(
+                Code::Usage,
+                format_args!("--animation {index}: {} {problem}", self.path.display()),
+            ));
+        }
+        let mut frame = FrameGeometry::default();
+        let animation = moment.animation.unwrap_or(0);
+        self.scene.at_animation(Some(animation), moment.time, &mut frame);
+        Ok(frame)
+    }
+
+    /// A few bytes of a file can ask for any number of instances.
+    fn check_size(&self) -> Result<(), Failure> {
+        let too_large = |what: String, limit: String| scene::Error::TooLarge {
+            path: self.path.clone(),
+            place: "all instances together".into(),
+            what,
+            limit,
+        };
+        let (vertices, triangles) = self.scene.posed_size();
+        for (number, what) in [(vertices, "vertices"), (triangles, "triangles")] {
+            if number > u64::from(u32::MAX) {
+                return Err(too_large(format!("the number of {number} {what}"), u32::MAX.to_string()).into());
+            }
+        }
+        // Positions and indices alone, see `FrameGeometry`.
+        let bytes = 12 * vertices + 16 * triangles;
+        match machine::total_memory() {
+            Some(memory) if bytes > memory => Err(too_large(
+                format!("the size of {bytes} bytes"),
+                format!("this machine's memory, {memory} bytes"),
+            )
+            .into()),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Middle of the box around the frame, in world space.
+pub(crate) fn center(frame: &FrameGeometry) -> DVec3 {
+    let middle = |(lo, hi): (glam::Vec3, glam::Vec3)| (lo.as_dvec3() + hi.as_dvec3()) / 2.0;
+    frame.origin + frame.bounds().map_or(DVec3::ZERO, middle)
+}
+
+/// The format by magic, else by ending, in the order in which the loader decides.
+pub(crate) fn format(path: &Path) -> String {
+    use std::io::Read;
+    let mut head = [0; 4];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut head));
+    match (read, &head) {
+        (Ok(()), b"glTF") => "GLB".into(),
+        (Ok(()), b"ply\n" | b"ply\r") => "PLY".into(),
+        _ => match path.extension() {
+            Some(ending) => ending.to_string_lossy().to_ascii_uppercase(),
+            None => "by content".into(),
+        },
+    }
+}

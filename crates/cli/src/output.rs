@@ -1,0 +1,174 @@
+//! Where a picture goes. All that can be wrong with it is said before anything is rendered.
+
+use std::io::{self, IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+use rayward::image_io::{encode_png, write_exr, write_npy, write_png};
+use rayward::{Error, Film, IntensityRange, LayerKind, Layers, ToneMap, ToneMapper};
+
+use crate::args::{PictureArgs, TargetArgs};
+use crate::failure::{Code, Failure};
+use crate::interrupt;
+use crate::values::{self, Operator};
+
+/// File written without any wish.
+const DEFAULT: &str = "rayward.png";
+
+/// Form of the picture file.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Form {
+    Png,
+    Exr,
+    Npy,
+}
+
+/// Where one picture goes.
+pub(crate) struct Targets {
+    /// The picture and its form; no path is standard output.
+    picture: Option<(Option<PathBuf>, Form)>,
+    /// Folder for arrays.
+    arrays: Option<PathBuf>,
+    tone_map: ToneMap,
+    /// Layers that have to be rendered besides the colour.
+    pub(crate) layers: Layers,
+}
+
+impl Targets {
+    /// Checks what was asked for. `json` says that standard output is taken.
+    pub(crate) fn new(target: &TargetArgs, picture: &PictureArgs, json: bool) -> Result<Self, Failure> {
+        let output = match (&target.output, &target.npy) {
+            (Some(path), _) => Some(path.as_path()),
+            (None, Some(_)) => None,
+            (None, None) => Some(Path::new(DEFAULT)),
+        };
+        let written = match output {
+            Some(path) if path.as_os_str() == "-" => {
+                if json {
+                    return Err(usage("--json and --output -: both go to standard output"));
+                }
+                if io::stdout().is_terminal() {
+                    return Err(usage(
+                        "--output -: standard output is a terminal, which shows no pictures",
+                    ));
+                }
+                Some((None, Form::Png))
+            }
+            Some(path) => {
+                let form = form(path)?;
+                check_folder(path)?;
+                Some((Some(path.to_path_buf()), form))
+            }
+            None => None,
+        };
+        let layered = target.npy.is_some() || written.as_ref().is_some_and(|(_, form)| *form == Form::Exr);
+        if !layered && !target.layers.is_empty() {
+            return Err(usage("--layers: only .exr files and --npy have layers"));
+        }
+        Ok(Self {
+            picture: written,
+            arrays: target.npy.clone(),
+            tone_map: tone_map(picture)?,
+            layers: if layered {
+                values::layers(&target.layers)
+            } else {
+                Layers::default()
+            },
+        })
+    }
+
+    /// Writes everything; returns the files. An interrupt waits until each is whole.
+    pub(crate) fn write(&self, film: &Film) -> Result<Vec<PathBuf>, Failure> {
+        let mut files = Vec::new();
+        match &self.picture {
+            Some((None, _)) => self.write_to_stdout(film)?,
+            Some((Some(path), form)) => {
+                interrupt::postpone(|| match form {
+                    Form::Png => write_png(path, film.width(), film.height(), &self.encode(film)),
+                    Form::Exr => write_exr(path, film),
+                    Form::Npy => write_npy(path, film, LayerKind::Color),
+                })?;
+                files.push(path.clone());
+            }
+            None => {}
+        }
+        if let Some(folder) = &self.arrays {
+            std::fs::create_dir_all(folder).map_err(|source| Error::Write {
+                path: folder.clone(),
+                source,
+            })?;
+            for kind in values::kinds(film) {
+                let path = folder.join(format!("{}.npy", kind.name()));
+                interrupt::postpone(|| write_npy(&path, film, kind))?;
+                files.push(path);
+            }
+        }
+        Ok(files)
+    }
+
+    fn write_to_stdout(&self, film: &Film) -> Result<(), Failure> {
+        let mut stdout = io::stdout().lock();
+        encode_png(&mut stdout, film.width(), film.height(), &self.encode(film))?;
+        let flushed = stdout.flush().map_err(|source| Error::Write {
+            path: "-".into(),
+            source,
+        });
+        Ok(flushed?)
+    }
+
+    fn encode(&self, film: &Film) -> Vec<u8> {
+        let mut mapper = ToneMapper::new(self.tone_map);
+        if self.tone_map == ToneMap::PreviousFrame {
+            mapper.end_frame(IntensityRange::of(&film.color));
+        }
+        mapper.encode(film)
+    }
+}
+
+fn usage(message: impl std::fmt::Display) -> Failure {
+    Failure::new(Code::Usage, message)
+}
+
+fn form(path: &Path) -> Result<Form, Failure> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match ending.to_str() {
+        Some("png") => Ok(Form::Png),
+        Some("exr") => Ok(Form::Exr),
+        Some("npy") => Ok(Form::Npy),
+        _ => Err(usage(format_args!(
+            "--output {}: the ending has to be .png, .exr or .npy",
+            path.display()
+        ))),
+    }
+}
+
+/// A missing folder is better found before the work than after it.
+fn check_folder(path: &Path) -> Result<(), Failure> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => Err(Failure::new(
+            Code::Runtime,
+            format_args!(
+                "cannot write {}: there is no folder {}",
+                path.display(),
+                folder.display()
+            ),
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn tone_map(args: &PictureArgs) -> Result<ToneMap, Failure> {
+    let stops = args.exposure.unwrap_or(0.0);
+    let operator = args.tone_map.unwrap_or(match args.exposure {
+        Some(_) => Operator::Exposure,
+        None => Operator::None,
+    });
+    match operator {
+        Operator::Exposure => Ok(ToneMap::Exposure { stops }),
+        Operator::Aces => Ok(ToneMap::Aces { stops }),
+        Operator::None | Operator::PreviousFrame if args.exposure.is_some() => {
+            Err(usage("--exposure: only the tone maps exposure and aces have one"))
+        }
+        Operator::None => Ok(ToneMap::None),
+        Operator::PreviousFrame => Ok(ToneMap::PreviousFrame),
+    }
+}

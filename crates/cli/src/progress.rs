@@ -1,0 +1,43 @@
+//! A progress bar on standard error, if that is a terminal.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use rayward::Progress;
+
+/// Shows how far a picture is.
+pub(crate) struct Bar(ProgressBar);
+
+impl Bar {
+    /// A bar, hidden if it is not wanted or standard error is no terminal. It has no colours.
+    pub(crate) fn new(shown: bool) -> Self {
+        let target = if shown {
+            ProgressDrawTarget::stderr_with_hz(10)
+        } else {
+            ProgressDrawTarget::hidden()
+        };
+        let bar = ProgressBar::with_draw_target(Some(1), target);
+        let style = ProgressStyle::with_template("{msg} {bar:40} {percent:>3} % {elapsed}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        Self(bar)
+    }
+
+    /// Names what is being done.
+    pub(crate) fn phase(&self, name: &'static str) {
+        self.0.set_message(name);
+        self.0.tick();
+    }
+
+    /// Called from all threads; the bar never goes back.
+    pub(crate) fn show(&self, progress: Progress) {
+        if self.0.length() != Some(progress.total) {
+            self.0.set_length(progress.total);
+        }
+        if progress.done > self.0.position() {
+            self.0.set_position(progress.done);
+        }
+    }
+
+    /// Takes the bar off the terminal.
+    pub(crate) fn clear(self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,138 @@
+//! `rayward render`: a scene to a picture.
+
+use std::time::Instant;
+
+use rayward::{RenderOptions, Renderer};
+
+use crate::args::{PictureArgs, RenderArgs};
+use crate::failure::{Code, Failure};
+use crate::input::Input;
+use crate::machine;
+use crate::output::Targets;
+use crate::progress::Bar;
+use crate::report;
+use crate::summary::{Summary, Times};
+use crate::values::Size;
+use crate::view::View;
+
+/// Renders, writes and tells what it cost.
+pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
+    let start = Instant::now();
+    let targets = Targets::new(&args.target, &args.picture, args.run.json)?;
+    let level = machine::simd_level(args.run.simd.as_deref())?;
+    machine::start_threads(args.run.threads)?;
+    let options = RenderOptions {
+        layers: targets.layers,
+        level,
+        ..options(&args.picture)
+    };
+
+    check_memory(&options)?;
+
+    let bar = Bar::new(!args.run.quiet);
+    bar.phase("reading");
+    let input = Input::read(&args.source)?;
+    bar.phase("posing");
+    let pose_start = Instant::now();
+    let frame = input.pose(&args.moment)?;
+    let pose = pose_start.elapsed();
+    let aspect = f64::from(options.width) / f64::from(options.height);
+    let view = View::choose(&args.view, &input, &frame, aspect)?;
+
+    bar.phase("preparing");
+    let prepare_start = Instant::now();
+    let mut renderer = Renderer::new(&input.scene);
+    let prepare = prepare_start.elapsed();
+    bar.phase("rendering");
+    let show = |progress| bar.show(progress);
+    let rendered = renderer.render(&frame, &view.camera, &view.lights, &options, &show)?;
+    bar.phase("writing");
+    let write_start = Instant::now();
+    let files = targets.write(&rendered.film)?;
+    let write = write_start.elapsed();
+    bar.clear();
+
+    if args.run.quiet && !args.run.json {
+        return Ok(());
+    }
+    let times = Times {
+        load: input.load,
+        pose,
+        prepare,
+        write,
+        total: start.elapsed(),
+    };
+    let summary = Summary::new(
+        &input,
+        &args.moment,
+        &view,
+        &options,
+        &rendered.stats,
+        &times,
+        files,
+    );
+    if args.run.json {
+        report::to_stdout_json(&summary)
+    } else {
+        report::note(&summary.text());
+        Ok(())
+    }
+}
+
+/// A picture that cannot fit is an error now instead of a killed process later.
+fn check_memory(options: &RenderOptions) -> Result<(), Failure> {
+    let layers = options.layers;
+    let layer = |kept: bool, bytes: u128| if kept { bytes } else { 0 };
+    // Bytes a pixel of each layer, see `Film`.
+    let pixel = 12
+        + layer(layers.alpha, 4)
+        + layer(layers.depth, 4)
+        + layer(layers.distance, 4)
+        + layer(layers.normal, 12)
+        + layer(layers.object, 4)
+        + layer(layers.prim, 4)
+        + layer(layers.bary, 8);
+    let (width, height) = (options.width, options.height);
+    let bytes = u128::from(width) * u128::from(height) * pixel;
+    match machine::total_memory() {
+        Some(memory) if bytes > u128::from(memory) => Err(Failure::new(
+            Code::Limit,
+            format_args!("a picture of {width}x{height} takes {bytes} bytes, this machine has {memory}"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+fn options(args: &PictureArgs) -> RenderOptions {
+    let defaults = RenderOptions::default();
+    let size = size(args, &defaults);
+    RenderOptions {
+        width: size.width,
+        height: size.height,
+        shadows: !args.no_shadows,
+        casters: args.casters.into(),
+        ambient: args.ambient.unwrap_or(defaults.ambient),
+        background: args.background.unwrap_or(defaults.background),
+        paper: args.paper,
+        ..defaults
+    }
+}
+
+/// The size asked for; a side that was left out follows from the other at the aspect of the defaults.
+fn size(args: &PictureArgs, defaults: &RenderOptions) -> Size {
+    let follow = |side: u32, from: u32, to: u32| {
+        let followed = (f64::from(side) * f64::from(to) / f64::from(from)).round();
+        (followed as u32).max(1)
+    };
+    let (w, h) = (defaults.width, defaults.height);
+    if let Some(size) = args.resolution {
+        return size;
+    }
+    let (width, height) = match (args.width, args.height) {
+        (Some(width), Some(height)) => (width, height),
+        (Some(width), None) => (width, follow(width, w, h)),
+        (None, Some(height)) => (follow(height, h, w), height),
+        (None, None) => (w, h),
+    };
+    Size { width, height }
+}

@@ -1,0 +1,225 @@
+//! What a picture was made of and what it cost, for people and for programs.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use rayward::{FrameStats, RenderOptions};
+use serde::Serialize;
+
+use crate::args::MomentArgs;
+use crate::input::Input;
+use crate::machine;
+use crate::report::{bytes, clean, count, duration, milliseconds, thousands};
+use crate::view::{Origin, View};
+
+/// Wall times of what the library does not time itself.
+pub(crate) struct Times {
+    pub(crate) load: Duration,
+    pub(crate) pose: Duration,
+    pub(crate) prepare: Duration,
+    pub(crate) write: Duration,
+    pub(crate) total: Duration,
+}
+
+/// The summary; its fields are those of the JSON object.
+#[derive(Serialize)]
+pub(crate) struct Summary {
+    scene: String,
+    files: Vec<String>,
+    width: u32,
+    height: u32,
+    time_s: f32,
+    camera: String,
+    camera_origin: Origin,
+    lights: Vec<String>,
+    lights_origin: Origin,
+    triangles: usize,
+    dropped_non_finite: usize,
+    dropped_degenerate: usize,
+    structures: Vec<Structure>,
+    eye_rays: u64,
+    shadow_rays: u64,
+    exact_pixels: u64,
+    lit_by_cell: u64,
+    /// Eye and shadow rays over the time of builds and tiles, shading included.
+    mray_per_s: f64,
+    load_ms: f64,
+    pose_ms: f64,
+    prepare_ms: f64,
+    build_ms: f64,
+    trace_ms: f64,
+    write_ms: f64,
+    total_ms: f64,
+    threads: usize,
+    simd: &'static str,
+    peak_memory_bytes: Option<u64>,
+    notices: Vec<String>,
+}
+
+#[derive(Serialize)]
+struct Structure {
+    name: String,
+    build_ms: f64,
+    bytes: usize,
+    cells: usize,
+    references: usize,
+}
+
+impl Summary {
+    /// Gathers it.
+    pub(crate) fn new(
+        input: &Input,
+        moment: &MomentArgs,
+        view: &View,
+        options: &RenderOptions,
+        stats: &FrameStats,
+        times: &Times,
+        files: Vec<PathBuf>,
+    ) -> Self {
+        let seconds = (stats.build + stats.trace).as_secs_f64();
+        let rays = (stats.eye_rays + stats.shadow_rays) as f64;
+        let mut notices: Vec<_> = input.scene.notices.iter().map(ToString::to_string).collect();
+        notices.extend(view.notices());
+        if moment.time != 0.0 && input.scene.animations.is_empty() {
+            notices.push("--time: the scene has no animation".into());
+        }
+        Self {
+            scene: input.path.display().to_string(),
+            files: files.iter().map(|file| file.display().to_string()).collect(),
+            width: options.width,
+            height: options.height,
+            time_s: moment.time,
+            camera: view.camera.name.clone(),
+            camera_origin: view.camera_origin,
+            lights: view.lights.iter().map(|light| light.name.clone()).collect(),
+            lights_origin: view.lights_origin,
+            triangles: stats.triangles,
+            dropped_non_finite: stats.dropped_non_finite,
+            dropped_degenerate: stats.dropped_degenerate,
+            structures: stats.structures.iter().map(Structure::from).collect(),
+            eye_rays: stats.eye_rays,
+            shadow_rays: stats.shadow_rays,
+            exact_pixels: stats.exact_pixels,
+            lit_by_cell: stats.lit_by_cell,
+            mray_per_s: rays / seconds.max(1e-9) / 1e6,
+            load_ms: milliseconds(times.load),
+            pose_ms: milliseconds(times.pose),
+            prepare_ms: milliseconds(times.prepare),
+            build_ms: milliseconds(stats.build),
+            trace_ms: milliseconds(stats.trace),
+            write_ms: milliseconds(times.write),
+            total_ms: milliseconds(times.total),
+            threads: rayon::current_num_threads(),
+            simd: options.level.name(),
+            peak_memory_bytes: machine::peak_memory(),
+            notices,
+        }
+    }
+
+    /// The lines for people.
+    pub(crate) fn text(&self) -> String {
+        let mut out = String::new();
+        self.write(&mut out).unwrap_or_default();
+        out.truncate(out.trim_end().len());
+        out
+    }
+
+    fn write(&self, out: &mut String) -> std::fmt::Result {
+        let ms = |ms: f64| duration(Duration::from_secs_f64(ms / 1e3));
+        for notice in &self.notices {
+            writeln!(out, "notice: {}", clean(notice))?;
+        }
+        write!(
+            out,
+            "scene       {}, {}",
+            clean(&self.scene),
+            count(self.triangles, "triangle")
+        )?;
+        match self.dropped_non_finite + self.dropped_degenerate {
+            0 => writeln!(out)?,
+            dropped => writeln!(
+                out,
+                "; {} dropped: {} not finite, {} without area",
+                thousands(dropped as u64),
+                thousands(self.dropped_non_finite as u64),
+                thousands(self.dropped_degenerate as u64)
+            )?,
+        }
+        writeln!(
+            out,
+            "camera      {}{}",
+            quoted(&self.camera, self.camera_origin),
+            self.camera_origin.words()
+        )?;
+        let lights = match self.lights.as_slice() {
+            [one] => quoted(one, self.lights_origin),
+            more => format!("{} ", more.len()),
+        };
+        writeln!(out, "light       {lights}{}", self.lights_origin.words())?;
+        for structure in &self.structures {
+            writeln!(
+                out,
+                "built       {} in {}, {}",
+                clean(&structure.name),
+                ms(structure.build_ms),
+                bytes(structure.bytes as u64)
+            )?;
+        }
+        writeln!(
+            out,
+            "rays        {} eye, {} shadow: {:.1} Mray/s with builds and shading",
+            thousands(self.eye_rays),
+            thousands(self.shadow_rays),
+            self.mray_per_s
+        )?;
+        writeln!(
+            out,
+            "time        {}: read {}, pose {}, prepare {}, build {}, trace and shade {}, write {}",
+            ms(self.total_ms),
+            ms(self.load_ms),
+            ms(self.pose_ms),
+            ms(self.prepare_ms),
+            ms(self.build_ms),
+            ms(self.trace_ms),
+            ms(self.write_ms)
+        )?;
+        let peak = self.peak_memory_bytes.map_or("unknown".into(), bytes);
+        writeln!(
+            out,
+            "memory      {peak} at peak; {}, {}",
+            count(self.threads, "thread"),
+            self.simd
+        )?;
+        match self.files.as_slice() {
+            [] => writeln!(out, "written     standard output, {}x{}", self.width, self.height),
+            files => {
+                for file in files {
+                    writeln!(out, "written     {}, {}x{}", clean(file), self.width, self.height)?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// A name from a file in quotes; nothing for the others, which say nothing more than the origin.
+fn quoted(name: &str, origin: Origin) -> String {
+    if name.is_empty() || origin == Origin::MadeUp {
+        String::new()
+    } else {
+        format!("\"{}\" ", clean(name))
+    }
+}
+
+impl From<&rayward::StructureStats> for Structure {
+    fn from(stats: &rayward::StructureStats) -> Self {
+        Self {
+            name: stats.name.clone(),
+            build_ms: milliseconds(stats.build),
+            bytes: stats.bytes,
+            cells: stats.cells,
+            references: stats.references,
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! Values of the command line: parsed, checked, and nothing else.
+
+use glam::{DVec3, Vec3};
+use rayward::{CasterPolicy, LayerKind, Layers, scene};
+
+/// What a parser returns.
+type Parsed<T> = Result<T, String>;
+
+fn number(text: &str) -> Parsed<f64> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err(format!("{text:?} is not a finite number")),
+    }
+}
+
+/// Three numbers `x,y,z`.
+pub(crate) fn vector(text: &str) -> Parsed<DVec3> {
+    let numbers: Vec<f64> = text.split(',').map(number).collect::<Parsed<_>>()?;
+    match *numbers {
+        [x, y, z] => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers x,y,z are needed".into()),
+    }
+}
+
+/// A unit vector along `x,y,z`, which are not all of them 0.
+pub(crate) fn direction(text: &str) -> Parsed<DVec3> {
+    vector(text)?
+        .try_normalize()
+        .ok_or_else(|| "it has no direction".into())
+}
+
+/// A linear colour `r,g,b`, no component below 0.
+pub(crate) fn color(text: &str) -> Parsed<Vec3> {
+    let color = vector(text)?.as_vec3();
+    if color.is_finite() && color.min_element() >= 0.0 {
+        Ok(color)
+    } else {
+        Err("no component of a colour may be below 0".into())
+    }
+}
+
+/// A number above 0.
+pub(crate) fn positive(text: &str) -> Parsed<f64> {
+    match number(text)? {
+        value if value > 0.0 => Ok(value),
+        _ => Err("it has to be above 0".into()),
+    }
+}
+
+/// A number not below 0.
+pub(crate) fn not_negative(text: &str) -> Parsed<f64> {
+    match number(text)? {
+        value if value >= 0.0 => Ok(value),
+        _ => Err("it has to be 0 or more".into()),
+    }
+}
+
+/// A finite number in single precision.
+pub(crate) fn single(text: &str) -> Parsed<f32> {
+    match number(text)? as f32 {
+        value if value.is_finite() => Ok(value),
+        _ => Err("it is too large".into()),
+    }
+}
+
+/// A full vertical field of view in degrees.
+pub(crate) fn field_of_view(text: &str) -> Parsed<f64> {
+    match number(text)? {
+        degrees if degrees > 0.0 && degrees < 180.0 => Ok(degrees),
+        _ => Err("it has to be above 0 and below 180 degrees".into()),
+    }
+}
+
+/// Width and height of a picture, `1920x1080`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Size {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+}
+
+/// A size `WxH`.
+pub(crate) fn size(text: &str) -> Parsed<Size> {
+    let side = |side: &str| side.parse::<u32>().ok().filter(|&pixels| pixels > 0);
+    text.split_once(['x', 'X'])
+        .and_then(|(w, h)| {
+            Some(Size {
+                width: side(w)?,
+                height: side(h)?,
+            })
+        })
+        .ok_or_else(|| "it has to be like 1920x1080".into())
+}
+
+/// A light on the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum LightValue {
+    /// `point:x,y,z[:candela]`
+    Point { position: DVec3, candela: Option<f32> },
+    /// `sun:x,y,z[:lux]`
+    Sun { towards: DVec3, lux: Option<f32> },
+}
+
+/// A light, see [`LightValue`].
+pub(crate) fn light(text: &str) -> Parsed<LightValue> {
+    let mut parts = text.split(':');
+    let kind = parts.next().unwrap_or_default();
+    let place = parts.next().ok_or("it has to be like point:1,2,3 or sun:1,2,3")?;
+    let intensity = match parts.next() {
+        None => None,
+        Some(text) => match single(text)? {
+            value if value >= 0.0 => Some(value),
+            _ => return Err("the intensity may not be below 0".into()),
+        },
+    };
+    if parts.next().is_some() {
+        return Err("there are more than three parts between colons".into());
+    }
+    match kind {
+        "point" => Ok(LightValue::Point {
+            position: vector(place)?,
+            candela: intensity,
+        }),
+        "sun" => Ok(LightValue::Sun {
+            towards: direction(place)?,
+            lux: intensity,
+        }),
+        _ => Err(format!("{kind:?} is neither point nor sun")),
+    }
+}
+
+/// Up axis of a file.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(crate) enum Up {
+    Y,
+    Z,
+}
+
+impl From<Up> for scene::UpAxis {
+    fn from(up: Up) -> Self {
+        match up {
+            Up::Y => Self::Y,
+            Up::Z => Self::Z,
+        }
+    }
+}
+
+/// Which sides of triangles cast shadows.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(crate) enum Casters {
+    /// Back faces where surfaces are closed, both sides elsewhere
+    Auto,
+    /// Both sides of all
+    Both,
+    /// Back faces of all: wrong where surfaces are open
+    Back,
+}
+
+impl From<Casters> for CasterPolicy {
+    fn from(casters: Casters) -> Self {
+        match casters {
+            Casters::Auto => Self::Auto,
+            Casters::Both => Self::Both,
+            Casters::Back => Self::Back,
+        }
+    }
+}
+
+/// The tone map by name; its exposure is an option of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Operator {
+    /// Cut off at 1
+    None,
+    /// Scaled by 2^exposure, then cut off
+    Exposure,
+    /// Scaled by 2^exposure, then a filmic curve
+    Aces,
+    /// Scaled as if the frame before had been the same
+    PreviousFrame,
+}
+
+/// A layer by name, or all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum LayerName {
+    All,
+    Color,
+    Alpha,
+    Depth,
+    Distance,
+    Normal,
+    Object,
+    Prim,
+    Bary,
+}
+
+/// The layers of these names; all if there are none. Colour is always there.
+pub(crate) fn layers(names: &[LayerName]) -> Layers {
+    let has = |name| names.is_empty() || names.contains(&LayerName::All) || names.contains(&name);
+    Layers {
+        alpha: has(LayerName::Alpha),
+        depth: has(LayerName::Depth),
+        distance: has(LayerName::Distance),
+        normal: has(LayerName::Normal),
+        object: has(LayerName::Object),
+        prim: has(LayerName::Prim),
+        bary: has(LayerName::Bary),
+    }
+}
+
+/// The kinds of layers a film with these layers holds.
+pub(crate) fn kinds(film: &rayward::Film) -> impl Iterator<Item = LayerKind> {
+    LayerKind::ALL.into_iter().filter(|&kind| film.holds(kind))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_have_three_finite_parts() {
+        assert_eq!(vector("-1,2.5, 3e2"), Ok(DVec3::new(-1.0, 2.5, 300.0)));
+        for wrong in ["", "1,2", "1,2,3,4", "1,2,x", "1,nan,2", "1,inf,2"] {
+            assert!(vector(wrong).is_err(), "{wrong}");
+        }
+        assert!(direction("0,0,0").is_err());
+        assert!(color("0.1,-0.1,0").is_err());
+        assert!(color("1e300,0,0").is_err());
+    }
+
+    #[test]
+    fn lights_have_a_kind_a_place_and_perhaps_an_intensity() {
+        let position = DVec3::new(1.0, -2.0, 3.0);
+        let candela = None;
+        assert_eq!(light("point:1,-2,3"), Ok(LightValue::Point { position, candela }));
+        let lux = Some(1000.0);
+        let towards = DVec3::Y;
+        assert_eq!(light("sun:0,1,0:1000"), Ok(LightValue::Sun { towards, lux }));
+        for wrong in [
+            "point",
+            "sun:0,0,0",
+            "lamp:1,2,3",
+            "point:1,2,3:-1",
+            "point:1,2,3:4:5",
+            "point:1,2,3:1e99",
+        ] {
+            assert!(light(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn sizes_and_angles() {
+        assert_eq!(
+            size("64x48"),
+            Ok(Size {
+                width: 64,
+                height: 48
+            })
+        );
+        for wrong in ["64", "0x48", "64x", "-1x5", "64x48x2", "99999999999x1"] {
+            assert!(size(wrong).is_err(), "{wrong}");
+        }
+        assert!(field_of_view("0").is_err() && field_of_view("180").is_err() && field_of_view("40").is_ok());
+    }
+}

@@ -1,0 +1,285 @@
+//! `info`, `compare`, `doctor`, `completions`, help, and how the program ends.
+
+mod support;
+
+use std::process::Stdio;
+
+use support::Folder;
+
+#[test]
+fn info_tells_what_is_in_a_scene() {
+    let folder = Folder::new();
+    let run = folder.run(&["info", "--builtin", "walker"]).expect(0);
+    let text = String::from_utf8(run.stdout).expect("text");
+    for word in [
+        "walker, built-in",
+        "triangles",
+        "1 skin",
+        "animation   0",
+        "bounds",
+        "closed",
+    ] {
+        assert!(text.contains(word), "{word} is not in\n{text}");
+    }
+    assert!(run.stderr.is_empty());
+    let json = folder
+        .run(&["info", "--builtin", "blob-1k", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(json["triangles"], 980);
+    assert!(
+        json["components"]["closed"]
+            .as_u64()
+            .is_some_and(|closed| closed >= 1)
+    );
+    assert_eq!(json["components"]["open"], 0);
+    assert!(folder.names().is_empty(), "info writes no file");
+}
+
+#[test]
+fn info_counts_what_is_dropped() {
+    let folder = Folder::new();
+    folder.file(
+        "a.obj",
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv nan 0 0\nf 1 2 3\nf 1 2 4\nf 1 1 2\n",
+    );
+    let json = folder.run(&["info", "a.obj", "--json"]).expect(0).json();
+    assert_eq!(json["format"], "OBJ");
+    assert_eq!(json["triangles"], 1);
+    assert_eq!(json["components"]["open"], 1);
+    let render = folder.run(&["render", "a.obj", "--resolution", "8x8"]).expect(0);
+    assert!(render.stderr.contains("dropped"), "{}", render.stderr);
+}
+
+#[test]
+fn compare_ends_with_5_beyond_the_tolerance() {
+    let folder = Folder::new();
+    let picture = |name: &str, more: &[&str]| {
+        let base = [
+            "render",
+            "--builtin",
+            "blob-1k",
+            "--resolution",
+            "64x48",
+            "-q",
+            "-o",
+            name,
+        ];
+        folder.run(&[&base, more].concat()).expect(0);
+    };
+    picture("a.png", &[]);
+    picture("b.png", &["--exposure", "0.2"]);
+    let json = folder
+        .run(&["compare", "a.png", "a.png", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(
+        (&json["rmse"], &json["differing_pixels"]),
+        (&0.0.into(), &0.into())
+    );
+    assert!(json["psnr_db"].is_null(), "infinite");
+
+    let run = folder
+        .run(&["compare", "a.png", "b.png", "--json", "--difference", "d.png"])
+        .expect(5);
+    let flip = run.json()["mean_flip"].as_f64().expect("a number");
+    assert!(flip > 0.0 && flip < 1.0, "{flip}");
+    assert!(folder.path("d.png").exists());
+    let compare = |tolerance: f64| {
+        let tolerance = tolerance.to_string();
+        folder.run(&["compare", "a.png", "b.png", "--tolerance", &tolerance])
+    };
+    let within = compare(flip * 1.01).expect(0);
+    assert!(String::from_utf8_lossy(&within.stdout).contains("within"));
+    let beyond = compare(flip * 0.99).expect(5);
+    assert!(String::from_utf8_lossy(&beyond.stdout).contains("beyond"));
+}
+
+#[test]
+fn compare_names_what_it_cannot_compare() {
+    let folder = Folder::new();
+    for (name, size) in [("a.png", "16x16"), ("b.png", "8x8")] {
+        folder
+            .run(&[
+                "render",
+                "--builtin",
+                "blob-1k",
+                "--resolution",
+                size,
+                "-q",
+                "-o",
+                name,
+            ])
+            .expect(0);
+    }
+    folder
+        .run(&["compare", "a.png", "b.png"])
+        .expect(5)
+        .says(&["16x16", "8x8"]);
+    folder
+        .run(&["compare", "a.png", "none.png"])
+        .expect(3)
+        .says(&["none.png"]);
+    let png = std::fs::read(folder.path("a.png")).expect("a picture");
+    folder.file("cut.png", &png[..png.len() / 2]);
+    folder
+        .run(&["compare", "a.png", "cut.png"])
+        .expect(3)
+        .says(&["cut.png"]);
+    folder.file("text.png", "no picture");
+    folder
+        .run(&["compare", "a.png", "text.png"])
+        .expect(3)
+        .says(&["text.png"]);
+}
+
+#[test]
+fn doctor_finds_this_machine_sound() {
+    let folder = Folder::new();
+    let json = folder.run(&["doctor", "--json"]).expect(0).json();
+    assert_eq!(json["self_test"], true);
+    assert!(json["threads"].as_u64().is_some_and(|threads| threads > 0));
+    let levels = json["simd_levels"].as_array().expect("levels");
+    assert!(levels.contains(&json["simd"]));
+    folder.run(&["doctor"]).expect(0);
+}
+
+#[test]
+fn completions_for_every_shell() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let run = folder.run(&["completions", shell]).expect(0);
+        assert!(
+            String::from_utf8_lossy(&run.stdout).contains("rayward"),
+            "{shell}"
+        );
+    }
+}
+
+#[test]
+fn help_has_examples_and_exit_codes() {
+    let folder = Folder::new();
+    let help = |arguments: &[&str]| {
+        let run = folder.run(arguments).expect(0);
+        assert!(run.stderr.is_empty());
+        String::from_utf8(run.stdout).expect("text")
+    };
+    let top = help(&["--help"]);
+    assert!(
+        top.contains("Examples:") && top.contains("Exit codes:") && top.contains("130"),
+        "{top}"
+    );
+    let render = help(&["render", "--help"]);
+    assert!(render.contains("Examples:") && render.contains("courtyard") && render.contains("blob-69k"));
+    assert!(help(&["--version"]).starts_with("rayward "));
+}
+
+#[test]
+fn a_senseless_command_line_ends_with_2() {
+    let folder = Folder::new();
+    for arguments in [
+        &[][..],
+        &["paint"],
+        &["render", "--builtin", "castle"],
+        &["render", "a.obj", "--builtin", "office"],
+        &["render", "--resolution", "0x5"],
+        &["render", "--width", "0"],
+        &["render", "--threads", "0"],
+        &["render", "--light", "moon:1,2,3"],
+        &["render", "--time", "nan"],
+        &["render", "-o", "picture.gif"],
+        &["render", "--tone-map", "none", "--exposure", "1"],
+        &["compare", "a.png"],
+    ] {
+        let run = folder.run(arguments).expect(2);
+        assert!(run.stdout.is_empty() && !run.stderr.is_empty(), "{arguments:?}");
+    }
+    assert!(folder.names().is_empty());
+}
+
+#[test]
+fn outputs_that_cannot_be_written_end_with_1() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("folder.png")).expect("a folder");
+    for output in ["missing/a.png", "folder.png"] {
+        let arguments = [
+            "render",
+            "--builtin",
+            "blob-1k",
+            "--resolution",
+            "8x8",
+            "-o",
+            output,
+        ];
+        folder.run(&arguments).expect(1).says(&[output]);
+    }
+    assert_eq!(folder.names(), ["folder.png"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_reader_that_leaves_is_no_disaster() {
+    let folder = Folder::new();
+    for arguments in [
+        &["completions", "bash"][..],
+        &["--help"],
+        &["info", "--builtin", "blob-1k", "--json"],
+        &[
+            "render",
+            "--builtin",
+            "blob-1k",
+            "--resolution",
+            "640x480",
+            "-q",
+            "-o",
+            "-",
+        ],
+    ] {
+        let mut child = folder
+            .command(arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        drop(child.stdout.take());
+        let output = child.wait_with_output().expect("the program ends");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.is_empty(), "{arguments:?} says {said}");
+        assert!(
+            matches!(output.status.code(), Some(0 | 1)),
+            "{arguments:?}: {}",
+            output.status
+        );
+    }
+}
+
+/// Ctrl-C while a picture is rendered: the code of an interrupt, and nothing left behind.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_interrupt_leaves_nothing_behind() {
+    use std::time::{Duration, Instant};
+
+    let folder = Folder::new();
+    let arguments = ["render", "--builtin", "forest", "--resolution", "8000x8000", "-q"];
+    let mut child = folder.command(&arguments).spawn().expect("the program runs");
+    let status = format!("/proc/{}/status", child.id());
+    let start = Instant::now();
+    // The handler is there when the mask of caught signals has SIGINT, the second bit.
+    let caught = || {
+        let text = std::fs::read_to_string(&status).unwrap_or_default();
+        let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+            .is_some_and(|mask| mask & 2 != 0)
+    };
+    while !caught() {
+        assert!(start.elapsed() < Duration::from_secs(60), "no handler");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(50));
+    let kill = std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(kill.is_ok_and(|status| status.success()));
+    assert_eq!(child.wait().expect("the program ends").code(), Some(130));
+    assert!(folder.names().is_empty(), "{:?}", folder.names());
+}
