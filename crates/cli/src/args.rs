@@ -74,10 +74,17 @@ pub(crate) struct SourceArgs {
         value_parser = PossibleValuesParser::new(builtin::NAMES))]
     pub(crate) builtin: Option<String>,
     /// The file's up axis
-    #[arg(long, value_name = "AXIS", default_value = "y", requires = "scene")]
+    #[arg(
+        long,
+        value_name = "AXIS",
+        default_value = "y",
+        requires = "scene",
+        conflicts_with = "builtin"
+    )]
     pub(crate) up: Up,
     /// Metres per unit of the file
-    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = values::positive, requires = "scene")]
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = values::positive, requires = "scene",
+        conflicts_with = "builtin")]
     pub(crate) scale: f64,
 }
 

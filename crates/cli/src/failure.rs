@@ -1,6 +1,5 @@
 //! How the program ends when it does not end well.
 
-use std::io::ErrorKind;
 use std::process::ExitCode;
 
 use rayward::{Error, scene};
@@ -74,11 +73,6 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let code = match &error {
             Error::Scene(error) => return Self::new(code_of_scene(error), error),
-            Error::Write { path, source }
-                if path.as_os_str() == "-" && source.kind() == ErrorKind::BrokenPipe =>
-            {
-                return Self::silent(Code::Runtime);
-            }
             Error::Read { .. }
             | Error::MalformedImage { .. }
             | Error::UnknownImageFormat { .. }

@@ -57,11 +57,17 @@ fn run(command: Command) -> Result<(), Failure> {
 
 /// Help and version are data; everything else the parser has to say is a usage error in this program's form.
 fn usage(error: &clap::Error) -> Result<(), Failure> {
-    let text = error.render();
+    let text = error.render().to_string();
     if !error.use_stderr() {
-        return report::to_stdout(text.to_string().as_bytes());
+        return report::to_stdout(text.as_bytes());
     }
-    let text = text.to_string();
-    let message = text.trim_end().strip_prefix("error: ").unwrap_or(&text);
-    Err(Failure::lines(Code::Usage, message))
+    let text = text.trim_end();
+    match text.strip_prefix("error: ") {
+        Some(message) => Err(Failure::lines(Code::Usage, message)),
+        // Help for a command line without a command.
+        None => {
+            report::note(text);
+            Err(Failure::silent(Code::Usage))
+        }
+    }
 }

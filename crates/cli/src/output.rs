@@ -1,6 +1,6 @@
 //! Where a picture goes. All that can be wrong with it is said before anything is rendered.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use rayward::image_io::{encode_png, write_exr, write_npy, write_png};
@@ -9,6 +9,7 @@ use rayward::{Error, Film, IntensityRange, LayerKind, Layers, ToneMap, ToneMappe
 use crate::args::{PictureArgs, TargetArgs};
 use crate::failure::{Code, Failure};
 use crate::interrupt;
+use crate::report;
 use crate::values::{self, Operator};
 
 /// File written without any wish.
@@ -106,13 +107,9 @@ impl Targets {
     }
 
     fn write_to_stdout(&self, film: &Film) -> Result<(), Failure> {
-        let mut stdout = io::stdout().lock();
-        encode_png(&mut stdout, film.width(), film.height(), &self.encode(film))?;
-        let flushed = stdout.flush().map_err(|source| Error::Write {
-            path: "-".into(),
-            source,
-        });
-        Ok(flushed?)
+        let mut bytes = Vec::new();
+        encode_png(&mut bytes, film.width(), film.height(), &self.encode(film))?;
+        report::to_stdout(&bytes)
     }
 
     fn encode(&self, film: &Film) -> Vec<u8> {

@@ -1,20 +1,20 @@
 //! A progress bar on standard error, if that is a terminal.
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use rayward::Progress;
 
 /// Shows how far a picture is.
 pub(crate) struct Bar(ProgressBar);
 
 impl Bar {
-    /// A bar, hidden if it is not wanted or standard error is no terminal. It has no colours.
+    /// A bar, hidden if it is not wanted or standard error is no terminal. It has no colours, and goes with this.
     pub(crate) fn new(shown: bool) -> Self {
         let target = if shown {
             ProgressDrawTarget::stderr_with_hz(10)
         } else {
             ProgressDrawTarget::hidden()
         };
-        let bar = ProgressBar::with_draw_target(Some(1), target);
+        let bar = ProgressBar::with_draw_target(Some(1), target).with_finish(ProgressFinish::AndClear);
         let style = ProgressStyle::with_template("{msg} {bar:40} {percent:>3} % {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         Self(bar)
@@ -34,10 +34,5 @@ impl Bar {
         if progress.done > self.0.position() {
             self.0.set_position(progress.done);
         }
-    }
-
-    /// Takes the bar off the terminal.
-    pub(crate) fn clear(self) {
-        self.0.finish_and_clear();
     }
 }

@@ -50,7 +50,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let write_start = Instant::now();
     let files = targets.write(&rendered.film)?;
     let write = write_start.elapsed();
-    bar.clear();
+    drop(bar);
 
     if args.run.quiet && !args.run.json {
         return Ok(());

@@ -1,10 +1,8 @@
 //! Broken inputs: each ends with its exit code and one line that names the file, and leaves no output.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 
-use support::{Folder, text};
+use crate::support::{Folder, Run, text};
 
 /// A GLB of this JSON and these bytes.
 fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
@@ -45,7 +43,7 @@ fn corners() -> Vec<u8> {
 
 /// Renders a file small; fails on output that is left beside an error.
 #[track_caller]
-fn render(folder: &Folder, file: &Path, code: i32) -> support::Run {
+fn render(folder: &Folder, file: &Path, code: i32) -> Run {
     let output = folder.path("out.png");
     let run = folder.run(&["render", text(file), "--resolution", "16x12", "-o", text(&output)]);
     let run = run.expect(code);

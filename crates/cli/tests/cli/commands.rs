@@ -1,10 +1,8 @@
 //! `info`, `compare`, `doctor`, `completions`, help, and how the program ends.
 
-mod support;
-
 use std::process::Stdio;
 
-use support::Folder;
+use crate::support::Folder;
 
 #[test]
 fn info_tells_what_is_in_a_scene() {

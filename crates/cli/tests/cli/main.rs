@@ -1,0 +1,6 @@
+//! The program from the outside: arguments and files in, exit codes, files and text out.
+
+mod bad_input;
+mod commands;
+mod render;
+mod support;
