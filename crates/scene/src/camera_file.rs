@@ -148,10 +148,10 @@ impl CameraEntry {
     }
 
     /// The lights in world space, point light first. Each is given the power that shows a white matt surface at
-    /// `center` which faces the light with radiance 1 (irradiance pi).
-    pub fn lights(&self, center: DVec3) -> Vec<PosedLight> {
-        let point = self.point_light.map(|p| point_light_for(p, center));
-        let area = self.area_light.map(|a| a.light_for(center));
+    /// the camera's target which faces the light with radiance 1 (irradiance pi).
+    pub fn lights(&self) -> Vec<PosedLight> {
+        let point = self.point_light.map(|p| point_light_for(p, self.target));
+        let area = self.area_light.map(|a| a.light_for(self.target));
         point.into_iter().chain(area).collect()
     }
 }

@@ -52,7 +52,7 @@ fn an_entry_gives_camera_and_lights() {
         }
     );
 
-    let lights = entries["low"].lights(DVec3::ZERO);
+    let lights = entries["low"].lights();
     let [point, area] = &lights[..] else {
         panic!("{lights:?}")
     };
@@ -70,7 +70,7 @@ fn an_entry_gives_camera_and_lights() {
     assert!(area.direction.distance(DVec3::NEG_Y) < 1e-12);
     assert!(area.axis_x.cross(area.axis_y).distance(-area.direction) < 1e-12);
     assert!((area.power.x * 0.1 / 4.0 - PI).abs() < 1e-5);
-    assert!(entries["high"].lights(DVec3::ZERO).is_empty());
+    assert!(entries["high"].lights().is_empty());
 }
 
 #[test]

@@ -115,7 +115,7 @@ fn files_without_permission_end_with_3() {
 
     let folder = Folder::new();
     let file = folder.file("closed.obj", "v 0 0 0\n");
-    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0)).expect("permissions");
+    std::fs::set_permissions(&file, std::fs::Permissions::from_mode(0o000)).expect("permissions");
     if std::fs::read(&file).is_ok() {
         println!("skipped: this user may read everything");
         return;
@@ -164,14 +164,20 @@ fn absurd_sizes_end_without_taking_the_memory() {
 #[test]
 fn names_in_files_do_not_command_the_terminal() {
     let folder = Folder::new();
-    let file = folder.file(
-        "a.obj",
-        "v 0 0 0\nv 1 0 0\nv 0 1 0\nmtllib \x1b[2J.mtl\nusemtl \x1b[31m\nf 1 2 3\n",
+    let named = gltf(r#"[{ "mesh": 0, "camera": 0 }]"#, ACCESSOR).replacen(
+        '{',
+        r#"{ "cameras": [{ "name": "\u001b[2J", "type": "perspective",
+            "perspective": { "yfov": 1, "znear": 0.1 } }],"#,
+        1,
     );
-    for command in ["info", "render"] {
-        let run = folder.run(&[command, text(&file)]);
-        let said = [run.stdout, run.stderr.into_bytes()].concat();
-        assert!(!said.contains(&0x1b), "{}", String::from_utf8_lossy(&said));
+    let required = named.replacen('{', r#"{ "extensionsRequired": ["EXT_\u001b[2J"],"#, 1);
+    for (name, json) in [("named.glb", named), ("required.glb", required)] {
+        let file = folder.file(name, glb(&json, &corners()));
+        for command in ["info", "render"] {
+            let run = folder.run(&[command, text(&file)]);
+            let said = String::from_utf8_lossy(&run.stdout).into_owned() + &run.stderr;
+            assert!(!said.contains('\x1b') && said.contains("\\u{1b}[2J"), "{said}");
+        }
     }
 }
 
@@ -183,9 +189,9 @@ fn files_below(folder: PathBuf) -> Vec<PathBuf> {
         for entry in std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display())) {
             let path = entry.expect("a folder entry").path();
             if path.is_dir() {
-                folders.push(path)
+                folders.push(path);
             } else {
-                found.push(path)
+                found.push(path);
             }
         }
     }
@@ -224,6 +230,13 @@ fn broken_files_of_others_end_with_0_3_or_4() {
         } else {
             run.says(&[&name]);
         }
+        let run = folder.run(&["compare", text(&file), text(&file)]);
+        assert!(
+            matches!(run.code, Some(0 | 3 | 4)),
+            "{name}: {:?}, {}",
+            run.code,
+            run.stderr
+        );
         assert!(folder.names().is_empty(), "{name} leaves {:?}", folder.names());
     }
 }

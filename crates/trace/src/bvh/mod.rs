@@ -1,6 +1,6 @@
 //! [`Bvh`]: a bounding volume hierarchy for arbitrary rays (reflection, refraction, single queries).
 //!
-//! Source: PLOC clustering with reinsertion (Meister and Bittner 2018, 2020), as `obvhs` implements it; widened to
+//! Source: PLOC clustering with reinsertion (Meister and Bittner 2018), as `obvhs` implements it; widened to
 //! four children a node.
 //!
 //! Layout: 128 bytes a node with its four child boxes side by side, 40 bytes a triangle in leaf order (its corners,
