@@ -37,7 +37,7 @@ impl Default for RenderOptions {
             shadows: true,
             casters: CasterPolicy::Auto,
             ambient: Vec3::splat(0.1),
-            background: Vec3::new(0.32, 0.4, 0.5),
+            background: Vec3::new(0.44, 0.54, 0.68),
             layers: Layers::default(),
             paper: false,
             level: SimdLevel::detect(),
