@@ -1,0 +1,140 @@
+//! Visibility of whole frames at 1920 x 1200 on one thread, every structure rebuilt for every frame.
+//!
+//! `eye`: grid built, closest triangle of every pixel found. `eye_and_hard_shadows`: the same, then one light's
+//! grid built and one shadow ray traced from every pixel that sees a surface. No shading. Items are rays.
+//!
+//! Built-in scenes always; the meshes of `RAYWARD_SCENES` (a folder with `cameras.json`) where it is set. Run
+//! as a test (`cargo test --benches`) the raster is small.
+
+use std::path::Path;
+use std::sync::Mutex;
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use rayward::CameraFrame;
+use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
+use rayward::trace::{
+    Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver, ShadowScratch, SimdLevel,
+    TileHits, Triangles, View, exact,
+};
+
+fn main() {
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one pool");
+    divan::main();
+}
+
+/// Names of the scenes that are there.
+fn scenes() -> Vec<String> {
+    let built_in = ["courtyard", "forest", "office", "conference", "blob-1k", "blob-16k", "blob-69k", "collide"];
+    let mut names: Vec<String> = built_in.map(String::from).to_vec();
+    if std::env::var_os("RAYWARD_SCENES").is_some() && !is_test() {
+        let meshes = ["bunny69k", "conference331k", "sponza66k", "crytek_sponza279k", "forest174k", "dragon_bunny252k"];
+        names.extend(meshes.map(|n| format!("{n}.ply")));
+    }
+    names
+}
+
+fn is_test() -> bool {
+    !std::env::args().any(|a| a == "--bench")
+}
+
+struct Frame {
+    name: String,
+    geometry: FrameGeometry,
+    camera: PosedCamera,
+    light: PosedLight,
+}
+
+/// The scene of that name; the last one is kept, for benchmarks of one scene follow each other.
+fn with_frame<R>(name: &str, use_it: impl FnOnce(&Frame) -> R) -> R {
+    static LAST: Mutex<Option<Frame>> = Mutex::new(None);
+    let mut last = LAST.lock().expect("no benchmark panics");
+    if last.as_ref().is_none_or(|f| f.name != name) {
+        *last = Some(load(name));
+    }
+    use_it(last.as_ref().expect("just loaded"))
+}
+
+fn load(name: &str) -> Frame {
+    let Some(mesh) = name.strip_suffix(".ply") else {
+        let geometry = scene::builtin::build(name).expect("a built-in scene").at(0.0);
+        let (camera, light) = (geometry.cameras[0].clone(), geometry.lights[0].clone());
+        return Frame { name: name.into(), geometry, camera, light };
+    };
+    let folder = std::env::var_os("RAYWARD_SCENES").expect("checked");
+    let folder = Path::new(&folder);
+    let cameras = scene::read_camera_file(&folder.join("cameras.json")).expect("a camera file");
+    let entry = &cameras[mesh];
+    let file = folder.join("bench").join(name);
+    let geometry = scene::load(&file, &LoadOptions::default()).expect("a mesh").at(0.0);
+    Frame { name: name.into(), geometry, camera: entry.camera(), light: entry.lights().remove(0) }
+}
+
+fn view(frame: &Frame) -> View {
+    let (width, height) = if is_test() { (96, 60) } else { (1920, 1200) };
+    let camera = CameraFrame::new(&frame.camera, frame.geometry.origin, width, height).expect("valid");
+    let half = [camera.step_x.length() * f64::from(width), camera.step_y.length() * f64::from(height)];
+    let axes = [camera.right, camera.up, camera.forward];
+    View::perspective(camera.eye, axes, half.map(|v| v * 0.5), [width, height])
+}
+
+fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
+    Triangles { x: &geometry.x, y: &geometry.y, z: &geometry.z, indices: &geometry.indices }
+}
+
+/// Closest triangles of all pixels, given to `see` tile by tile as receivers.
+fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver])) {
+    let triangles = triangles(&frame.geometry);
+    let grid = EyeGrid::build(view(frame), triangles, EyeGridOptions::default(), SimdLevel::detect());
+    let (mut hits, mut receivers) = (TileHits::default(), Vec::new());
+    for index in 0..grid.tile_count() {
+        let tile = grid.tile(index);
+        grid.trace_tile(&tile, &mut hits);
+        receivers.clear();
+        for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+            let Some(prim) = hits.prim(x, y) else { continue };
+            let ray = grid.view().pixel_ray(tile.x + x, tile.y + y);
+            if let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)) {
+                let (point, error) = (ray.origin + ray.dir * hit.t, hit.t * 1e-12);
+                receivers.push(Receiver { point, error, prim });
+            }
+        }
+        see(&receivers);
+    }
+}
+
+#[divan::bench(args = scenes())]
+fn eye(bencher: Bencher, name: &str) {
+    with_frame(name, |frame| {
+        let triangles = triangles(&frame.geometry);
+        let view = view(frame);
+        bencher.counter(ItemsCount::new(view.width * view.height)).bench_local(|| {
+            let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), SimdLevel::detect());
+            let mut hits = TileHits::default();
+            for index in 0..grid.tile_count() {
+                grid.trace_tile(&grid.tile(index), &mut hits);
+            }
+            hits
+        });
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
+    with_frame(name, |frame| {
+        let light = match frame.light.kind {
+            LightKind::Directional { .. } => Light::Directional((-frame.light.direction).as_vec3()),
+            _ => Light::Point((frame.light.position - frame.geometry.origin).as_vec3()),
+        };
+        let (mut asked, view) = (0, view(frame));
+        trace(frame, |receivers| asked += receivers.len());
+        let rays = (view.width * view.height) as usize + asked;
+        bencher.counter(ItemsCount::new(rays)).bench_local(|| {
+            let (triangles, options) = (triangles(&frame.geometry), LightGridOptions::default());
+            let grid = PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
+            let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
+            trace(frame, |receivers| grid.shadowed(receivers, &mut scratch, &mut shadow));
+            scratch.counts
+        });
+    });
+}
