@@ -76,9 +76,7 @@ impl View {
 
         let center = input::center(frame);
         // An entry's area light stands where its point light does: the same light for soft shadows.
-        let of_file = entry.map_or(Vec::new(), |entry| {
-            entry.lights().into_iter().take(1).collect()
-        });
+        let of_file = entry.map_or(Vec::new(), |entry| entry.lights().into_iter().take(1).collect());
         let (lights, lights_origin) = if !args.lights.is_empty() {
             let lights = args.lights.iter().map(|light| posed(light, center));
             (lights.collect(), Origin::CommandLine)

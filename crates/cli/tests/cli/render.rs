@@ -67,17 +67,13 @@ fn the_picture_does_not_depend_on_threads_or_instruction_set() {
         .run(&small(&["--quiet", "-o", "one.png", "--threads", "1"]))
         .expect(0);
     let one = std::fs::read(folder.path("one.png")).expect("the picture");
-    let mut others = vec![("threads", "2")];
-    others.extend(
-        levels
-            .iter()
-            .map(|level| ("simd", level.as_str().expect("a name"))),
-    );
+    let mut others = vec![("threads", serde_json::json!(2))];
+    others.extend(levels.into_iter().map(|level| ("simd", level)));
     for (option, value) in others {
-        let option = format!("--{option}");
-        folder
-            .run(&small(&["--quiet", "-o", "other.png", &option, value]))
-            .expect(0);
+        let argument = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+        let option_name = format!("--{option}");
+        let run = folder.run(&small(&["--json", "-o", "other.png", &option_name, &argument]));
+        assert_eq!(run.expect(0).json()[option], value, "the one asked for is used");
         let other = std::fs::read(folder.path("other.png")).expect("the picture");
         assert!(one == other, "{option} {value} changes the picture");
     }
