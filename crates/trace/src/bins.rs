@@ -144,22 +144,30 @@ impl Chunk {
 const SLACK: f32 = 1.0 / 64.0;
 
 /// Inclusive cell rectangle of raster bounds; `None` if it holds nothing that matters.
+#[inline]
 fn cell_rect(grid: &CellGrid, min: [f32; 2], max: [f32; 2]) -> Option<[[u32; 2]; 2]> {
     let mut rect = [[0; 2]; 2];
     for axis in 0..2 {
-        let (mut low, mut high) = (min[axis] - SLACK, max[axis] + SLACK);
-        if grid.pixel_centres {
-            // The first and the last half-integer within.
-            low = (low - 0.5).ceil() + 0.5;
-            high = (high - 0.5).floor() + 0.5;
-        }
         let limit = grid.cells[axis] as f32 * grid.side;
+        let (low, high) = (min[axis] - SLACK, max[axis] + SLACK);
         // Written so that NaN is refused.
         if !(low <= high && high >= 0.0 && low < limit) {
             return None;
         }
+        let (mut low, mut high) = (low.max(0.0), high.min(limit));
+        if grid.pixel_centres {
+            // Half-integers within; conversions to integers cut off, and a function call each for `floor` and
+            // `ceil` would be a third of the cost of binning.
+            let last = (high + 0.5) as i32 - 1;
+            let first = (low - 0.5) as i32;
+            let first = first + i32::from((first as f32) < low - 0.5);
+            if first > last {
+                return None;
+            }
+            (low, high) = (first as f32, last as f32);
+        }
         let last = grid.cells[axis] - 1;
-        rect[0][axis] = ((low.max(0.0) / grid.side) as u32).min(last);
+        rect[0][axis] = ((low / grid.side) as u32).min(last);
         rect[1][axis] = ((high / grid.side) as u32).min(last);
     }
     Some(rect)

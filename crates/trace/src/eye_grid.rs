@@ -183,40 +183,40 @@ impl<'a> EyeGrid<'a> {
         }
         let mut bad = draw_batch(self.level, buffer, vertices, edges, [tile.x, tile.y], blocks);
         while bad != 0 {
-            let prim = prims[bad.trailing_zeros() as usize];
+            let lane = bad.trailing_zeros() as usize;
             bad &= bad - 1;
-            self.draw_precise(tile, blocks, prim, buffer);
+            let rect = vertices.block_rect(lane, [tile.x, tile.y], blocks);
+            self.draw_precise(tile, blocks, prims[lane], rect, buffer);
         }
     }
 
-    fn draw_precise(&self, tile: &Tile, blocks: [u32; 2], prim: u32, buffer: &mut TileBuffer) {
+    /// Draws a triangle that the lanes could not set up; `rect` is `None` where it may cover the whole tile.
+    fn draw_precise(
+        &self,
+        tile: &Tile,
+        blocks: [u32; 2],
+        prim: u32,
+        rect: Option<BlockRect>,
+        buffer: &mut TileBuffer,
+    ) {
         let Some(precise) = PreciseTriangle::new(&self.view, self.triangles.corners(prim)) else {
             return;
         };
-        let Some([min, max]) = precise.bounds(&self.view) else {
-            return;
-        };
-        let range = |axis: usize, origin: u32| {
-            let last = f64::from(blocks[axis] * BLOCK - 1);
-            let origin = f64::from(origin) + 0.5;
-            let first = (min[axis] - origin).clamp(0.0, last) as u32;
-            let end = (max[axis] - origin).clamp(0.0, last).ceil() as u32;
-            [first / BLOCK, end / BLOCK]
-        };
-        let rect = BlockRect {
-            x: range(0, tile.x),
-            y: range(1, tile.y),
+        let whole = BlockRect {
+            x: [0, blocks[0] - 1],
+            y: [0, blocks[1] - 1],
         };
         let reach = f64::from(blocks[0].max(blocks[1]) * BLOCK);
         let record = precise.record(prim, [f64::from(tile.x), f64::from(tile.y)], reach);
-        draw(self.level, buffer, &record, rect);
+        draw(self.level, buffer, &record, rect.unwrap_or(whole));
     }
 
     /// Decides the unsure pixels exactly.
     fn settle(&self, tile: &Tile, hits: &mut TileHits) {
         let buffer = &mut hits.buffer;
         hits.exact_pixels = 0;
-        for unsure in std::mem::take(&mut buffer.unsure) {
+        let unsure_pixels = std::mem::take(&mut buffer.unsure);
+        for unsure in &unsure_pixels {
             let (block, lane) = (unsure.block as usize, unsure.lane as usize);
             let x = (unsure.block % buffer.stride) * BLOCK + unsure.lane % BLOCK;
             let y = (unsure.block / buffer.stride) * BLOCK + unsure.lane / BLOCK;
@@ -240,6 +240,7 @@ impl<'a> EyeGrid<'a> {
                 buffer.nearness[block][lane] = self.view.nearness(hit.t) as f32;
             }
         }
+        buffer.unsure = unsure_pixels;
     }
 
     fn exact_hit(&self, ray: &ViewRay, prim: u32) -> Option<ExactHit> {

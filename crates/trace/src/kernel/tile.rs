@@ -88,16 +88,28 @@ fn draw_batch_impl<S: Simd>(
     while good != 0 {
         let lane = good.trailing_zeros() as usize;
         good &= good - 1;
-        let x = [vertices.x[0][lane], vertices.x[1][lane], vertices.x[2][lane]];
-        let y = [vertices.y[0][lane], vertices.y[1][lane], vertices.y[2][lane]];
-        let rect = BlockRect {
-            x: block_range(x, ox, blocks[0]),
-            y: block_range(y, oy, blocks[1]),
-        };
+        let rect = vertices.rect_of_lane(lane, [ox, oy], blocks);
         let record = edges.record(lane, vertices.prim[lane]);
         draw_impl(simd, tile, &record, rect);
     }
     bad
+}
+
+impl VertexLanes {
+    /// Blocks of a tile that a triangle's rectangle touches; `None` if a vertex does not lie in front.
+    pub(crate) fn block_rect(&self, lane: usize, origin: [u32; 2], blocks: [u32; 2]) -> Option<BlockRect> {
+        let ahead = self.nearness.iter().all(|n| n[lane] >= 0.0);
+        ahead.then(|| self.rect_of_lane(lane, origin.map(|v| v as f32), blocks))
+    }
+
+    #[inline(always)]
+    fn rect_of_lane(&self, lane: usize, origin: [f32; 2], blocks: [u32; 2]) -> BlockRect {
+        let pick = |v: &[[f32; LANES]; 3]| [v[0][lane], v[1][lane], v[2][lane]];
+        BlockRect {
+            x: block_range(pick(&self.x), origin[0], blocks[0]),
+            y: block_range(pick(&self.y), origin[1], blocks[1]),
+        }
+    }
 }
 
 /// Blocks whose pixel centres lie between the smallest and the largest of `v`, a little widened.
