@@ -14,21 +14,40 @@ use divan::counter::ItemsCount;
 use rayward::CameraFrame;
 use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
-    Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver, ShadowScratch, SimdLevel,
-    TileHits, Triangles, View, exact,
+    Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver, ShadowScratch,
+    SimdLevel, TileHits, Triangles, View, exact,
 };
 
 fn main() {
-    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("one pool");
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build_global()
+        .expect("one pool");
     divan::main();
 }
 
 /// Names of the scenes that are there.
 fn scenes() -> Vec<String> {
-    let built_in = ["courtyard", "forest", "office", "conference", "blob-1k", "blob-16k", "blob-69k", "collide"];
+    let built_in = [
+        "courtyard",
+        "forest",
+        "office",
+        "conference",
+        "blob-1k",
+        "blob-16k",
+        "blob-69k",
+        "collide",
+    ];
     let mut names: Vec<String> = built_in.map(String::from).to_vec();
     if std::env::var_os("RAYWARD_SCENES").is_some() && !is_test() {
-        let meshes = ["bunny69k", "conference331k", "sponza66k", "crytek_sponza279k", "forest174k", "dragon_bunny252k"];
+        let meshes = [
+            "bunny69k",
+            "conference331k",
+            "sponza66k",
+            "crytek_sponza279k",
+            "forest174k",
+            "dragon_bunny252k",
+        ];
         names.extend(meshes.map(|n| format!("{n}.ply")));
     }
     names
@@ -59,33 +78,58 @@ fn load(name: &str) -> Frame {
     let Some(mesh) = name.strip_suffix(".ply") else {
         let geometry = scene::builtin::build(name).expect("a built-in scene").at(0.0);
         let (camera, light) = (geometry.cameras[0].clone(), geometry.lights[0].clone());
-        return Frame { name: name.into(), geometry, camera, light };
+        return Frame {
+            name: name.into(),
+            geometry,
+            camera,
+            light,
+        };
     };
     let folder = std::env::var_os("RAYWARD_SCENES").expect("checked");
     let folder = Path::new(&folder);
     let cameras = scene::read_camera_file(&folder.join("cameras.json")).expect("a camera file");
     let entry = &cameras[mesh];
     let file = folder.join("bench").join(name);
-    let geometry = scene::load(&file, &LoadOptions::default()).expect("a mesh").at(0.0);
-    Frame { name: name.into(), geometry, camera: entry.camera(), light: entry.lights().remove(0) }
+    let geometry = scene::load(&file, &LoadOptions::default())
+        .expect("a mesh")
+        .at(0.0);
+    Frame {
+        name: name.into(),
+        geometry,
+        camera: entry.camera(),
+        light: entry.lights().remove(0),
+    }
 }
 
 fn view(frame: &Frame) -> View {
     let (width, height) = if is_test() { (96, 60) } else { (1920, 1200) };
     let camera = CameraFrame::new(&frame.camera, frame.geometry.origin, width, height).expect("valid");
-    let half = [camera.step_x.length() * f64::from(width), camera.step_y.length() * f64::from(height)];
+    let half = [
+        camera.step_x.length() * f64::from(width),
+        camera.step_y.length() * f64::from(height),
+    ];
     let axes = [camera.right, camera.up, camera.forward];
     View::perspective(camera.eye, axes, half.map(|v| v * 0.5), [width, height])
 }
 
 fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
-    Triangles { x: &geometry.x, y: &geometry.y, z: &geometry.z, indices: &geometry.indices }
+    Triangles {
+        x: &geometry.x,
+        y: &geometry.y,
+        z: &geometry.z,
+        indices: &geometry.indices,
+    }
 }
 
 /// Closest triangles of all pixels, given to `see` tile by tile as receivers.
 fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver])) {
     let triangles = triangles(&frame.geometry);
-    let grid = EyeGrid::build(view(frame), triangles, EyeGridOptions::default(), SimdLevel::detect());
+    let grid = EyeGrid::build(
+        view(frame),
+        triangles,
+        EyeGridOptions::default(),
+        SimdLevel::detect(),
+    );
     let (mut hits, mut receivers) = (TileHits::default(), Vec::new());
     for index in 0..grid.tile_count() {
         let tile = grid.tile(index);
@@ -108,14 +152,16 @@ fn eye(bencher: Bencher, name: &str) {
     with_frame(name, |frame| {
         let triangles = triangles(&frame.geometry);
         let view = view(frame);
-        bencher.counter(ItemsCount::new(view.width * view.height)).bench_local(|| {
-            let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), SimdLevel::detect());
-            let mut hits = TileHits::default();
-            for index in 0..grid.tile_count() {
-                grid.trace_tile(&grid.tile(index), &mut hits);
-            }
-            hits
-        });
+        bencher
+            .counter(ItemsCount::new(view.width * view.height))
+            .bench_local(|| {
+                let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), SimdLevel::detect());
+                let mut hits = TileHits::default();
+                for index in 0..grid.tile_count() {
+                    grid.trace_tile(&grid.tile(index), &mut hits);
+                }
+                hits
+            });
     });
 }
 
@@ -131,9 +177,12 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
         let rays = (view.width * view.height) as usize + asked;
         bencher.counter(ItemsCount::new(rays)).bench_local(|| {
             let (triangles, options) = (triangles(&frame.geometry), LightGridOptions::default());
-            let grid = PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
+            let grid =
+                PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
             let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
-            trace(frame, |receivers| grid.shadowed(receivers, &mut scratch, &mut shadow));
+            trace(frame, |receivers| {
+                grid.shadowed(receivers, &mut scratch, &mut shadow);
+            });
             scratch.counts
         });
     });

@@ -209,3 +209,42 @@ fn one_and_two_threads_give_the_same_bits() {
     };
     assert!(on(1) == on(2));
 }
+
+#[test]
+fn a_hundred_kilometres_away_is_the_same_picture() {
+    let near = builtin::build("walker").expect("it exists");
+    let mut far = near.clone();
+    // A whole number of the origin's steps, so that positions stay the same to the bit.
+    let offset = DVec3::new(102_400.0, 0.0, -102_400.0);
+    for node in far.nodes.iter_mut().filter(|n| n.parent.is_none()) {
+        let moved = glam::DMat4::from_translation(offset) * node.transform.matrix();
+        node.transform = rayward::scene::Transform::Matrix(moved);
+    }
+    let options = RenderOptions {
+        width: 160,
+        height: 120,
+        layers: Layers {
+            prim: true,
+            ..Layers::default()
+        },
+        ..RenderOptions::default()
+    };
+    let [near, far] = [&near, &far].map(|scene| {
+        let geometry = scene.at(0.0);
+        render(scene, &geometry, &geometry.cameras[0], &geometry.lights, &options)
+    });
+    let pixels = near.color.len();
+    let others = (0..pixels).filter(|&i| near.prim[i] != far.prim[i]).count();
+    assert!(
+        others * 1000 <= pixels,
+        "{others} of {pixels} pixels see another triangle"
+    );
+    let differing = (0..pixels)
+        .filter(|&i| near.prim[i] == far.prim[i])
+        .filter(|&i| (near.color[i] - far.color[i]).abs().max_element() > 1e-3)
+        .count();
+    assert!(
+        differing * 1000 <= pixels,
+        "{differing} of {pixels} pixels have another colour"
+    );
+}

@@ -73,7 +73,11 @@ pub enum Transform {
 
 impl Default for Transform {
     fn default() -> Self {
-        Self::Trs { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+        Self::Trs {
+            translation: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            scale: DVec3::ONE,
+        }
     }
 }
 
@@ -81,9 +85,11 @@ impl Transform {
     /// The transform as a matrix.
     pub fn matrix(&self) -> DMat4 {
         match *self {
-            Self::Trs { translation, rotation, scale } => {
-                DMat4::from_scale_rotation_translation(scale, rotation, translation)
-            }
+            Self::Trs {
+                translation,
+                rotation,
+                scale,
+            } => DMat4::from_scale_rotation_translation(scale, rotation, translation),
             Self::Matrix(matrix) => matrix,
         }
     }
@@ -162,7 +168,10 @@ pub struct Animation {
 impl Animation {
     /// Time of the last key, in seconds.
     pub fn duration(&self) -> f32 {
-        self.channels.iter().filter_map(|c| c.times.last().copied()).fold(0.0, f32::max)
+        self.channels
+            .iter()
+            .filter_map(|c| c.times.last().copied())
+            .fold(0.0, f32::max)
     }
 }
 

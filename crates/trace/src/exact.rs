@@ -1,6 +1,6 @@
 //! The one decision whether a ray meets a triangle. Every structure's answer is this answer.
 //!
-//! For a ray (o, d) and corners v0, v1, v2 let a_i = v_i - o. The three edge functions
+//! For a ray (o, d) and corners v0, v1, v2 let `a_i = v_i - o`. The three edge functions
 //!
 //! ```text
 //! e0 = d . (a1 x a2)     e1 = d . (a2 x a0)     e2 = d . (a0 x a1)
@@ -8,14 +8,14 @@
 //!
 //! are the signed volumes between the ray and the edges. The ray meets the triangle if no two of them have
 //! opposite signs and not all vanish (a ray within the triangle's plane misses it). The signs are exact:
-//! Shewchuk's adaptive predicates decide where f64 rounding could not. A ray through a shared edge therefore
+//! adaptive predicates (Shewchuk 1997) decide where f64 rounding could not. A ray through a shared edge therefore
 //! meets one of the two triangles, or both, never none; around a vertex likewise. This is watertight by
 //! construction, without a tie rule, at any scale and offset.
 //!
 //! The parameter is t = (a0 . N) / (d . N) with N = (v1 - v0) x (v2 - v0), in f64, in this order of operations:
 //! it decides which of two triangles is closer, equal values going to the smaller id.
 //!
-//! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, a_i = fl(v_i - o);
+//! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, `a_i = fl(v_i - o)`;
 //! for f32 input whose exponents differ by less than 29 that is exact.
 
 use glam::{DVec3, Vec3, Vec3Swizzles};

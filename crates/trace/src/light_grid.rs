@@ -388,8 +388,9 @@ fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, prim: u32) -> 
     let towards = light.towards(triangles.corners(prim)[0].as_dvec3());
     let facing = normal.dot(towards);
     let certain = normal.length() * towards.length() * 1e-12;
-    // Negated so that what is not finite stays and is sorted out later.
-    !(facing > certain)
+    // What is not finite stays and is sorted out later.
+    let front = facing > certain;
+    !front
 }
 
 /// Set-ups done by one task.

@@ -1,11 +1,11 @@
 //! One triangle in a view, in f64: for the few that f32 lanes cannot set up.
 //!
-//! In homogeneous raster coordinates p_i = (x, y, w) the edge functions are n_i = p_j x p_k dotted with
-//! (x, y, 1): no clipping is needed for triangles that reach behind the center of projection. Their sign is
-//! oriented so that every ray that hits (t > 0) sees all three non-negative; that orientation is exact.
-//! Nearness is sum(m_i E_i) / det. The raster's origin is moved next to the triangle first, so that products of
-//! coordinates stay small and errors with them. Cost: some 150 operations; used for triangles that cross the center's plane,
-//! lie far outside of the raster or are nearly edge-on, and to bin large ones.
+//! In homogeneous raster coordinates `p_i` = (x, y, w) the edge functions are `p_j x p_k` dotted with (x, y, 1)
+//! (Olano and Greer 1997): no clipping is needed for triangles that reach behind the center of projection. Their
+//! sign is oriented so that every ray that hits (t > 0) sees all three non-negative; that orientation is exact.
+//! Nearness is `sum(m_i E_i) / det`. The raster's origin is moved next to the triangle first, so that products of
+//! coordinates stay small and errors with them. Cost: some 150 operations; used for triangles that cross the
+//! center's plane, lie far outside of the raster or are nearly edge-on, and to bin large ones.
 
 use glam::{DVec3, Vec3};
 use robust::{Coord3D, orient3d};

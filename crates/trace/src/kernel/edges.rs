@@ -7,7 +7,7 @@
 //! n(q)   = nearness_x q.x + nearness_y q.y + nearness
 //! ```
 //!
-//! where g_i is the i-th edge function divided by a bound on its own error: min(g) > 1 is certainly inside,
+//! where `g_i` is the i-th edge function divided by a bound on its own error: min(g) > 1 is certainly inside,
 //! min(g) < -1 certainly outside, between is unsure. n(q) is within a quarter of
 //! [`super::NEARNESS_BAND`] of the truth, relatively, wherever `floor <= n(q) <= ceiling`.
 //!

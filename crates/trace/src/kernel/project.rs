@@ -64,7 +64,7 @@ fn project_impl<S: Simd>(
             let load = |s: &[f32]| f32x16::from_fn(simd, |i| s.get(i).copied().unwrap_or(0.0));
             project_lanes(simd, view, [load(x), load(y), load(z)])
         };
-        let [x, y, nearness] = vertices.map(|v| <[f32; LANES]>::from(v));
+        let [x, y, nearness] = vertices.map(<[f32; LANES]>::from);
         for (i, vertex) in out.iter_mut().enumerate() {
             *vertex = RasterVertex {
                 x: x[i],
