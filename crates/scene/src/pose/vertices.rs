@@ -157,17 +157,19 @@ impl Draw<'_> {
             })
     }
 
-    /// The weighted sum of the joint matrices of vertex `v`.
+    /// The weighted mean of the joint matrices of vertex `v`. Weights in f32 miss a sum of 1 by some 1e-7, which far
+    /// from the world's zero would be a visible shift.
     #[inline]
     fn blend(&self, joints: &[DMat4], v: usize) -> DMat4 {
-        let weights = self.primitive.weights[v].to_array();
-        let pairs = self.primitive.joints[v]
-            .iter()
-            .zip(weights)
-            .filter(|(_, w)| *w != 0.0);
-        pairs.fold(DMat4::ZERO, |sum, (&j, w)| {
-            sum + joints[usize::from(j)] * f64::from(w)
-        })
+        let weights = self.primitive.weights[v].as_dvec4();
+        let total = weights.element_sum();
+        let scale = if total > 0.0 { total.recip() } else { 0.0 };
+        let pairs = self.primitive.joints[v].iter().zip(weights.to_array());
+        pairs
+            .filter(|(_, w)| *w != 0.0)
+            .fold(DMat4::ZERO, |sum, (&j, w)| {
+                sum + joints[usize::from(j)] * (w * scale)
+            })
     }
 }
 
