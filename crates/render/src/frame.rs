@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
-use rayward_trace::{Topology, View};
+use rayward_trace::{Light, Topology, View};
 
 use crate::casters::{CasterRules, triangles};
 use crate::plan::FramePlan;
@@ -91,10 +91,10 @@ impl<'s> Renderer<'s> {
             lights: &shading_lights,
             ends: &plan.lights,
             structures: &structures,
-            rules: &rules,
+            eye: eye_of(&camera),
             options,
         };
-        let side = structures.eye.tile(0).width.max(structures.eye.tile(0).height);
+        let side = structures.eye.tile_side();
         let mut tiles = film.tiles_mut(side, side);
         let (done, total) = (AtomicU64::new(0), tiles.len() as u64);
         let counts = tiles
@@ -136,6 +136,15 @@ impl<'s> Renderer<'s> {
     }
 }
 
+/// Where the eye rays come from, as the one whose side of a triangle is seen.
+fn eye_of(camera: &CameraFrame) -> Light {
+    if camera.orthographic {
+        Light::Directional((-camera.forward).as_vec3())
+    } else {
+        Light::Point(camera.eye)
+    }
+}
+
 /// The camera's rays as the structures know them.
 fn view(camera: &CameraFrame, geometry: &FrameGeometry) -> View {
     let axes = [camera.right, camera.up, camera.forward];
@@ -152,5 +161,5 @@ fn view(camera: &CameraFrame, geometry: &FrameGeometry) -> View {
         let corner = |p: glam::Vec3| -> DVec3 { (p.as_dvec3() - eye).abs() };
         corner(low).max(corner(high)).length()
     });
-    View::parallel(camera.eye, axes, half, 4.0 * farthest + 1.0, size)
+    View::parallel(camera.eye, axes, half, 4.0 * farthest.max(1e-30), size)
 }

@@ -1,11 +1,13 @@
 //! One tile: eye hits, surfaces, shadows light by light, colours (HM08 §3: eye rays drive everything, shadow
 //! rays are spawned for a tile of hits at a time).
 
-use glam::{DVec3, Vec2, Vec3};
-use rayward_scene::FrameGeometry;
-use rayward_trace::{Accel, Bvh, Hit, Light, Ray, Receiver, ShadowScratch, Tile, TileHits, exact};
+use std::ops::ControlFlow;
 
-use crate::casters::{CasterRules, triangles};
+use glam::{Vec2, Vec3};
+use rayward_scene::FrameGeometry;
+use rayward_trace::{Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay, exact};
+
+use crate::casters::triangles;
 use crate::plan::LightPlan;
 use crate::shade::{ambient, direct, object_of};
 use crate::structures::FrameStructures;
@@ -20,7 +22,8 @@ pub(crate) struct TileShader<'f> {
     pub(crate) lights: &'f [ShadingLight],
     pub(crate) ends: &'f [Option<LightPlan>],
     pub(crate) structures: &'f FrameStructures<'f>,
-    pub(crate) rules: &'f CasterRules<'f>,
+    /// Where the eye rays come from.
+    pub(crate) eye: Light,
     pub(crate) options: &'f RenderOptions,
 }
 
@@ -33,8 +36,8 @@ pub(crate) struct TileWork {
     asked: Vec<(u32, Vec3)>,
     shadow: Vec<bool>,
     scratch: ShadowScratch,
-    layers: Vec<Hit>,
-    filters: Vec<Hit>,
+    layers: Vec<(f64, u32)>,
+    filters: Vec<u32>,
 }
 
 /// A surface seen by a pixel, or one of several behind each other.
@@ -97,115 +100,92 @@ impl TileShader<'_> {
 
     /// Notes the surfaces that a pixel sees; returns the pixel without their light.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
-        let mut sample = Sample::background(self.options.background);
+        let background = Sample::background(self.options.background);
         let Some(prim) = work.hits.prim(x, y) else {
-            return sample;
+            return background;
         };
         let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
-        let eye_ray = Ray::new(ray.origin.as_vec3(), ray.dir.as_vec3());
-        let corners = triangles(self.geometry).corners(prim);
-        let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) else {
-            return sample;
+        let Some((hit, first)) = self.point([x, y], &ray, prim, 1.0) else {
+            return background;
         };
-        let object = object_of(self.geometry, prim);
-        let (t, length) = (hit.t as f32, ray.dir.length() as f32);
-        let point = SurfacePoint {
-            prim,
-            object,
-            u: hit.u as f32,
-            v: hit.v as f32,
-            view: (-ray.dir.normalize()).as_vec3(),
-            footprint: self.camera.footprint(t),
-        };
-        let surface = self.shader.surface(self.geometry, &point);
-        sample = Sample {
+        let (depth, covered) = (hit.t as f32, first.weight);
+        let mut sample = Sample {
             color: Vec3::ZERO,
             alpha: 1.0,
-            depth: t,
-            distance: t * length,
-            normal: surface.normal,
-            object,
+            depth,
+            distance: depth * ray.dir.length() as f32,
+            normal: first.surface.normal,
+            object: object_of(self.geometry, prim),
             prim,
-            bary: Vec2::new(point.u, point.v),
+            bary: Vec2::new(hit.u as f32, hit.v as f32),
         };
-        let receiver = Receiver::on_surface(&eye_ray, hit.t, prim);
-        let receiver = Receiver {
-            point: ray.origin + ray.dir * hit.t,
-            ..receiver
-        };
-        let first = ShadedPoint {
-            x,
-            y,
-            receiver,
-            weight: surface.alpha,
-            color: self.glow(&surface),
-            surface,
-        };
-        let mut left = 1.0 - first.weight;
         work.points.push(first);
-        let first_hit = Hit {
-            t,
-            u: point.u,
-            v: point.v,
-            prim,
-        };
+        let mut left = 1.0 - covered;
         if let (true, Some(bvh)) = (left > 0.0, &self.structures.layers) {
-            left = self.see_through(bvh, &eye_ray, &first_hit, [x, y], work);
+            left = self.see_through(bvh, [x, y], &ray, (hit.t, prim), left, work);
         }
         sample.alpha = 1.0 - left;
         sample.color = self.options.background * left;
         sample
     }
 
+    /// Where a ray meets a triangle that it is known to meet, and the surface there; `left` is the share of the
+    /// pixel that nothing before it covers.
+    fn point(
+        &self,
+        [x, y]: [u32; 2],
+        ray: &ViewRay,
+        prim: u32,
+        left: f32,
+    ) -> Option<(exact::ExactHit, ShadedPoint)> {
+        let hit = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))?;
+        let surface = self.shader.surface(
+            self.geometry,
+            &SurfacePoint {
+                prim,
+                object: object_of(self.geometry, prim),
+                u: hit.u as f32,
+                v: hit.v as f32,
+                view: (-ray.dir.normalize()).as_vec3(),
+                footprint: self.camera.footprint(hit.t as f32),
+            },
+        );
+        let point = ShadedPoint {
+            x,
+            y,
+            receiver: Receiver::along(ray, hit.t, prim),
+            weight: left * surface.alpha,
+            color: ambient(&surface, self.options.ambient),
+            surface,
+        };
+        Some((hit, point))
+    }
+
     /// Notes what is seen behind a surface that does not cover its pixel, front to back; returns the share of the
     /// pixel that nothing covers.
-    fn see_through(&self, bvh: &Bvh, ray: &Ray, first: &Hit, [x, y]: [u32; 2], work: &mut TileWork) -> f32 {
-        let mut left = 1.0 - work.points.last().map_or(0.0, |point| point.weight);
-        bvh.all_hits(ray, &mut work.layers);
-        for hit in work
-            .layers
-            .iter()
-            .filter(|h| h.prim != first.prim && h.t >= first.t)
-        {
-            let object = object_of(self.geometry, hit.prim);
-            let point = SurfacePoint {
-                prim: hit.prim,
-                object,
-                u: hit.u,
-                v: hit.v,
-                view: -ray.dir.normalize(),
-                footprint: self.camera.footprint(hit.t),
+    fn see_through(
+        &self,
+        bvh: &Bvh,
+        pixel: [u32; 2],
+        ray: &ViewRay,
+        first: (f64, u32),
+        mut left: f32,
+        work: &mut TileWork,
+    ) -> f32 {
+        bvh.along(ray, &mut (), &mut work.layers);
+        for &(_, prim) in work.layers.iter().skip_while(|hit| **hit != first).skip(1) {
+            let Some((_, point)) = self.point(pixel, ray, prim, left) else {
+                continue;
             };
-            let surface = self.shader.surface(self.geometry, &point);
-            let exact = exact::attributes(
-                ray.origin.as_dvec3(),
-                ray.dir.as_dvec3(),
-                triangles(self.geometry).corners(hit.prim),
-            );
-            let t = exact.map_or(f64::from(hit.t), |h| h.t);
-            let receiver = Receiver::on_surface(ray, t, hit.prim);
-            let weight = left * surface.alpha;
-            left -= weight;
-            if weight > 0.0 {
-                work.points.push(ShadedPoint {
-                    x,
-                    y,
-                    receiver,
-                    weight,
-                    color: self.glow(&surface),
-                    surface,
-                });
+            left -= point.weight;
+            if point.weight > 0.0 {
+                work.points.push(point);
             }
             if left < INVISIBLE {
                 return 0.0;
             }
         }
         left
-    }
-
-    /// Light that needs no shadow ray.
-    fn glow(&self, surface: &Surface) -> Vec3 {
-        ambient(surface, self.options.ambient)
     }
 
     /// Adds the light of one source to all points of the tile that it reaches.
@@ -222,7 +202,9 @@ impl TileShader<'_> {
         receivers.clear();
         asked.clear();
         for (i, point) in points.iter().enumerate() {
-            if let Some(incident) = direct(&point.surface, &self.lights[light]) {
+            if let Some(incident) = direct(&point.surface, &self.lights[light])
+                && self.faces(light, &point.receiver)
+            {
                 receivers.push(point.receiver);
                 asked.push((i as u32, incident.radiance));
             }
@@ -248,27 +230,39 @@ impl TileShader<'_> {
         }
     }
 
+    /// Whether a light is on the side of a surface that the eye sees. Casters are chosen by the same decision, so
+    /// that rounding at a terminator cannot let light through.
+    fn faces(&self, light: usize, receiver: &Receiver) -> bool {
+        let Some(plan) = &self.ends[light] else {
+            return true;
+        };
+        let corners = triangles(self.geometry).corners(receiver.prim);
+        let (lit, seen) = (exact::side(corners, &plan.light), exact::side(corners, &self.eye));
+        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+    }
+
     /// Share of the light that masked and blended triangles let through to a receiver.
-    fn transmittance(&self, bvh: &Bvh, receiver: &Receiver, light: &Light, hits: &mut Vec<Hit>) -> f32 {
-        let triangles = triangles(self.geometry);
-        let towards: DVec3 = light.towards(receiver.point);
-        let mut ray = Ray::new(receiver.point.as_vec3(), towards.as_vec3());
-        if matches!(light, Light::Point(_)) {
-            ray.t_max = 1.0;
-        }
-        bvh.all_hits(&ray, hits);
-        let mut passed = 1.0;
-        for hit in hits {
-            let filters =
-                self.rules.is_transparent(hit.prim) && exact::shadows(&triangles, hit.prim, receiver, light);
-            if filters {
-                let object = object_of(self.geometry, hit.prim);
-                passed *= 1.0
-                    - self
-                        .shader
-                        .coverage(self.geometry, hit.prim, object, hit.u, hit.v);
-            }
-        }
-        passed
+    fn transmittance(&self, bvh: &Bvh, receiver: &Receiver, light: &Light, filters: &mut Vec<u32>) -> f32 {
+        let (origin, dir) = match *light {
+            Light::Point(position) => (position.as_dvec3(), receiver.point - position.as_dvec3()),
+            Light::Directional(direction) => (receiver.point, direction.as_dvec3()),
+        };
+        filters.clear();
+        bvh.each_shadow(receiver, light, &mut (), |prim| {
+            filters.push(prim);
+            ControlFlow::Continue(())
+        });
+        filters.sort_unstable();
+        let coverage = |&prim: &u32| {
+            let hit = exact::attributes(origin, dir, triangles(self.geometry).corners(prim))?;
+            let object = object_of(self.geometry, prim);
+            let (u, v) = (hit.u as f32, hit.v as f32);
+            Some(self.shader.coverage(self.geometry, prim, object, u, v))
+        };
+        filters
+            .iter()
+            .filter_map(coverage)
+            .map(|covered| 1.0 - covered)
+            .product()
     }
 }

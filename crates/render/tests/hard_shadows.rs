@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use rayward::scene::{FrameGeometry, LightKind, PosedCamera, PosedLight, Scene, builtin};
 use rayward::shade::{ambient, direct, object_of};
-use rayward::trace::{Accel, BruteForce, Light, Ray, Receiver, SimdLevel, Triangles, View, exact};
+use rayward::trace::{Accel, BruteForce, Light, Receiver, SimdLevel, Triangles, View, exact};
 use rayward::{
     CameraFrame, CasterPolicy, Film, Layers, NO_ID, RenderOptions, Renderer, Shader, ShadingLight,
     SurfacePoint,
@@ -51,11 +51,8 @@ fn reference_pixel(
         footprint: camera.footprint(t as f32),
     };
     let surface = scene.surface(geometry, &point);
-    let eye_ray = Ray::new(camera.eye, ray.dir.as_vec3());
-    let receiver = Receiver {
-        point: ray.origin + ray.dir * t,
-        ..Receiver::on_surface(&eye_ray, t, prim)
-    };
+    let receiver = Receiver::along(&ray, t, prim);
+    let seen = exact::side(triangles.corners(prim), &Light::Point(camera.eye));
     let mut color = ambient(&surface, options.ambient);
     for light in lights {
         let Some(incident) = direct(&surface, &ShadingLight::new(light, geometry.origin)) else {
@@ -65,7 +62,9 @@ fn reference_pixel(
             LightKind::Directional { .. } => Light::Directional((-light.direction).as_vec3()),
             _ => Light::Point((light.position - geometry.origin).as_vec3()),
         };
-        if !BruteForce::new(triangles).shadowed(&receiver, &end) {
+        let lit = exact::side(triangles.corners(prim), &end);
+        let same_side = (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0);
+        if same_side && !BruteForce::new(triangles).shadowed(&receiver, &end) {
             color += incident.radiance;
         }
     }

@@ -30,6 +30,8 @@ pub(crate) struct CellGrid {
     pub(crate) cells: [u32; 2],
     /// Side of a cell in raster units.
     pub(crate) side: f32,
+    /// Width and height of the raster; cells at its end may reach beyond.
+    pub(crate) size: [f32; 2],
     /// Whether a triangle matters only if it may cover a half-integer raster point (a pixel centre).
     pub(crate) pixel_centres: bool,
 }
@@ -48,7 +50,10 @@ pub(crate) struct Bins {
 }
 
 /// Triangles in a chunk at least: below, the per-cell starts would cost more than the references.
-const CHUNK: usize = 32 * 1024;
+const SMALLEST_CHUNK: usize = 32 * 1024;
+
+/// Chunks at most: every chunk has a start for every cell.
+const CHUNKS: usize = 16;
 
 impl Bins {
     /// Sorts those triangles of `prims` for which `keep` holds.
@@ -61,10 +66,11 @@ impl Bins {
         keep: impl Fn(u32) -> bool + Sync,
     ) -> Self {
         let count = triangles.len();
-        let chunks = (0..count.div_ceil(CHUNK))
+        let chunk_size = count.div_ceil(CHUNKS).max(SMALLEST_CHUNK);
+        let chunks = (0..count.div_ceil(chunk_size))
             .into_par_iter()
             .map(|chunk| {
-                let prims = (chunk * CHUNK) as u32..((chunk + 1) * CHUNK).min(count) as u32;
+                let prims = (chunk * chunk_size) as u32..((chunk + 1) * chunk_size).min(count) as u32;
                 let mut pairs = Vec::with_capacity(prims.len());
                 for prim in prims {
                     if keep(prim) {
@@ -148,7 +154,7 @@ const SLACK: f32 = 1.0 / 64.0;
 fn cell_rect(grid: &CellGrid, min: [f32; 2], max: [f32; 2]) -> Option<[[u32; 2]; 2]> {
     let mut rect = [[0; 2]; 2];
     for axis in 0..2 {
-        let limit = grid.cells[axis] as f32 * grid.side;
+        let limit = grid.size[axis];
         let (low, high) = (min[axis] - SLACK, max[axis] + SLACK);
         // Written so that NaN is refused.
         if !(low <= high && high >= 0.0 && low < limit) {

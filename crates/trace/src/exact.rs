@@ -103,8 +103,9 @@ pub fn attributes(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<Exact
     })
 }
 
-/// The hit moved to where the line passes the triangle's box. Hierarchies and grids prune by boxes: a `t` that
-/// cancellation has put outside would be found or not depending on the structure.
+/// The hit moved to where the line passes the triangle's box, and to the side of the origin on which it truly lies.
+/// Hierarchies and grids prune by boxes, and grids know exactly what lies in front: a `t` that cancellation has put
+/// elsewhere would be found or not depending on the structure.
 #[cold]
 fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
     let (low, high) = (a0.min(a1).min(a2), a0.max(a1).max(a2));
@@ -119,10 +120,31 @@ fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
     // All three may be no number; comparisons are written so that it does not survive.
     let share = |x: f64, most: f64| if x > 0.0 { x.min(most) } else { 0.0 };
     let u = share(hit.u, 1.0);
-    ExactHit {
-        t: hit.t.max(enter).min(leave),
-        u,
-        v: share(hit.v, 1.0 - u),
+    let v = share(hit.v, 1.0 - u);
+    let t = hit.t.max(enter).min(leave);
+    // t = a0 . N / d . N, and the edge functions of a hit have the sign of d . N.
+    let edges = [volume(a1, a2, dir), volume(a2, a0, dir), volume(a0, a1, dir)];
+    let steepness = edges.into_iter().find(|&e| e != 0.0).unwrap_or(0.0);
+    let ahead = volume(a0, a1, a2) * steepness.signum();
+    let t = match ahead {
+        _ if ahead == 0.0 => 0.0,
+        _ if ahead > 0.0 => t.max(f64::MIN_POSITIVE),
+        _ => t.min(-f64::MIN_POSITIVE),
+    };
+    ExactHit { t, u, v }
+}
+
+/// Which side of a triangle a light sees: positive for the front, negative for the back, 0 edge-on. The sign is
+/// exact.
+#[inline]
+pub fn side(corners: [Vec3; 3], light: &Light) -> f64 {
+    let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    match *light {
+        Light::Point(position) => {
+            let from = position.as_dvec3();
+            -volume(v0 - from, v1 - from, v2 - from)
+        }
+        Light::Directional(direction) => volume(v1 - v0, v2 - v0, direction.as_dvec3()),
     }
 }
 

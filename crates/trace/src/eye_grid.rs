@@ -5,7 +5,8 @@
 //! tests each against the rays of its rectangle, the rays coming from the raster's formula.
 //!
 //! Layout: 16 bytes a vertex, about 4 bytes a triangle and tile, 8 bytes a pixel while a tile is traced. Rebuilt
-//! every frame. Answers: exactly those of [`crate::BruteForce`], see [`crate::exact`].
+//! every frame. Answers: exactly those of testing every triangle with [`crate::exact`] for
+//! [`View::pixel_ray`].
 
 use rayon::prelude::*;
 
@@ -15,7 +16,7 @@ use crate::exact::{self, ExactHit};
 use crate::kernel::SimdLevel;
 use crate::kernel::edges::{EdgeLanes, VertexLanes};
 use crate::kernel::project::{RasterVertex, project};
-use crate::kernel::tile::{BLOCK, BlockRect, NONE, TileBuffer, draw, draw_batch};
+use crate::kernel::tile::{BLOCK, BlockRect, NONE, TileBuffer, TilePlace, draw, draw_batch};
 use crate::kernel::{LANES, NEARNESS_BAND};
 use crate::precise::PreciseTriangle;
 use crate::view::{View, ViewRay};
@@ -23,7 +24,7 @@ use crate::view::{View, ViewRay};
 /// Parameters of an [`EyeGrid`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EyeGridOptions {
-    /// Side of a tile in pixels; rounded up to a multiple of 4.
+    /// Side of a tile in pixels, from 4 to 256; rounded up to a multiple of 4.
     pub tile: u32,
     /// How triangles are put into tiles.
     pub binning: Binning,
@@ -54,6 +55,7 @@ pub struct EyeGrid<'a> {
     view: View,
     triangles: Triangles<'a>,
     level: SimdLevel,
+    rounding: f32,
     vertices: Vec<RasterVertex>,
     grid: CellGrid,
     bins: Bins,
@@ -80,7 +82,7 @@ pub struct TileHits {
     buffer: TileBuffer,
     vertices: VertexLanes,
     edges: EdgeLanes,
-    /// Pixels settled by the exact decision in the last tile.
+    /// Pairs of pixel and triangle settled by the exact decision in the last tile.
     pub exact_pixels: usize,
 }
 
@@ -106,6 +108,7 @@ impl<'a> EyeGrid<'a> {
         let grid = CellGrid {
             cells,
             side: side as f32,
+            size: [view.width as f32, view.height as f32],
             pixel_centres: true,
         };
         let vertices = project_all(level, &view, &triangles);
@@ -114,6 +117,7 @@ impl<'a> EyeGrid<'a> {
             view,
             triangles,
             level,
+            rounding: view.rounding() as f32,
             vertices,
             grid,
             bins,
@@ -123,6 +127,11 @@ impl<'a> EyeGrid<'a> {
     /// The view it was built for.
     pub fn view(&self) -> &View {
         &self.view
+    }
+
+    /// Side of a tile in pixels; tiles at the right and bottom edge may be smaller.
+    pub fn tile_side(&self) -> u32 {
+        self.grid.side as u32
     }
 
     /// Number of tiles.
@@ -181,7 +190,12 @@ impl<'a> EyeGrid<'a> {
             let corners = self.triangles.indices[prim as usize].map(|i| &self.vertices[i as usize]);
             vertices.push(prim, corners);
         }
-        let mut bad = draw_batch(self.level, buffer, vertices, edges, [tile.x, tile.y], blocks);
+        let place = TilePlace {
+            origin: [tile.x, tile.y],
+            blocks,
+            rounding: self.rounding,
+        };
+        let mut bad = draw_batch(self.level, buffer, vertices, edges, &place);
         while bad != 0 {
             let lane = bad.trailing_zeros() as usize;
             bad &= bad - 1;

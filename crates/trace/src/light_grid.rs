@@ -4,8 +4,8 @@
 //! exactly one cell of a 2-D grid, and only order along the ray remains. Each cell has the list of its casters
 //! and a bound on the nearest of them: a receiver before that bound is lit without a test.
 //!
-//! A light outside of the geometry has one face aimed at it, a light within has the six faces of a cube, a
-//! directional light one parallel face. A face's raster shows only the window in which there is geometry. No
+//! A light that sees all of the geometry within 120 degrees has one face aimed at it, others have the six faces of
+//! a cube, as far as there is geometry in them; a directional light has one parallel face. A face's raster shows only the window in which there is geometry. No
 //! near plane is needed: triangles that come close to the light, or reach behind it, are set up in
 //! homogeneous coordinates ([`crate::precise`]), so no occluder is clipped away.
 //!
@@ -14,7 +14,10 @@
 //! leaves it again before it reaches the light. Elsewhere both sides cast. The caller says which, see
 //! [`Casts`].
 //!
-//! Layout: 16 bytes a vertex while building; 84 bytes a caster, 4 bytes a reference, 8 bytes a cell. Rebuilt every
+//! Limits: where coordinates pass 1e30 every caster is tested for every receiver.
+//!
+//! Layout: 16 bytes a vertex while building; 72 bytes a caster, 4 bytes a reference, 4 bytes a cell and 4 more
+//! for each chunk of triangles. Rebuilt every
 //! frame. Answers: exactly those of [`crate::BruteForce`], see [`crate::exact`].
 
 use glam::{DVec3, Vec3};
@@ -23,7 +26,7 @@ use rayon::prelude::*;
 use crate::bins::{Binning, Bins, CellGrid};
 use crate::exact;
 use crate::eye_grid::project_all;
-use crate::kernel::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes};
+use crate::kernel::edges::{EdgeLanes, EdgeRecord, VertexLanes};
 use crate::kernel::points::{Caster, PointLanes, set_up_casters, shadowed};
 use crate::kernel::project::RasterVertex;
 use crate::kernel::{LANES, NEARNESS_BAND, SimdLevel};
@@ -34,7 +37,8 @@ use crate::{Light, Receiver, Triangles};
 /// Parameters of a [`PointLightGrid`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LightGridOptions {
-    /// Cells in each direction of a face; `None` chooses by the number of casters.
+    /// Cells in each direction of a face, at most [`MAX_RESOLUTION`]; `None` chooses by number and size of the
+    /// triangles.
     pub resolution: Option<u32>,
     /// How triangles are put into cells.
     pub binning: Binning,
@@ -84,6 +88,8 @@ pub struct PointLightGrid<'a> {
     triangles: Triangles<'a>,
     level: SimdLevel,
     faces: Vec<Face>,
+    /// Casters to be tested one by one, where the geometry is too large to be projected.
+    unprojected: Vec<u32>,
 }
 
 #[derive(Clone, Debug)]
@@ -133,16 +139,23 @@ impl<'a> PointLightGrid<'a> {
         options: LightGridOptions,
         level: SimdLevel,
     ) -> Self {
-        let faces = crate::light_views::views(&light, &triangles, options.cone)
-            .into_iter()
-            .map(|view| Face::build(view, &light, &triangles, rule, &options, level))
-            .collect();
-        Self {
+        let mut grid = Self {
             light,
             triangles,
             level,
-            faces,
+            faces: Vec::new(),
+            unprojected: Vec::new(),
+        };
+        if let Some(views) = crate::light_views::views(&light, &triangles, options.cone) {
+            let face = |view| Face::build(view, &light, &triangles, rule, &options, level);
+            grid.faces = views.into_iter().map(face).collect();
+        } else {
+            let prims = 0..triangles.len() as u32;
+            let casts = |&prim: &u32| takes_part(&light, &triangles, rule(prim), prim);
+            let finite = |&prim: &u32| triangles.corners(prim).iter().all(|c| c.is_finite());
+            grid.unprojected = prims.filter(finite).filter(casts).collect();
         }
+        grid
     }
 
     /// Cells of all faces.
@@ -172,6 +185,14 @@ impl<'a> PointLightGrid<'a> {
     pub fn shadowed(&self, receivers: &[Receiver], scratch: &mut ShadowScratch, shadow: &mut Vec<bool>) {
         shadow.clear();
         shadow.resize(receivers.len(), false);
+        if !self.unprojected.is_empty() {
+            scratch.counts.receivers += receivers.len() as u64;
+            for (receiver, shadow) in receivers.iter().zip(shadow) {
+                let hides = |&prim: &u32| exact::shadows(&self.triangles, prim, receiver, &self.light);
+                *shadow = receiver.point.is_finite() && self.unprojected.iter().any(hides);
+            }
+            return;
+        }
         self.sort_into_cells(receivers, scratch);
         let pending = std::mem::take(&mut scratch.pending);
         for same_cell in pending.chunk_by(|a, b| (a.face, a.cell) == (b.face, b.cell)) {
@@ -248,7 +269,11 @@ impl<'a> PointLightGrid<'a> {
         let all = u32::MAX >> (32 - batch.len() as u32);
         let mut open = all;
         scratch.unsure.clear();
-        for refs in face.bins.cell(batch[0].cell as usize) {
+        for refs in face
+            .bins
+            .cell(batch[0].cell as usize)
+            .filter(|refs| !refs.is_empty())
+        {
             open = shadowed(
                 self.level,
                 &scratch.points,
@@ -298,6 +323,7 @@ impl Face {
         let grid = CellGrid {
             cells: [view.width, view.height],
             side: 1.0,
+            size: [view.width as f32, view.height as f32],
             pixel_centres: false,
         };
         let vertices = project_all(level, &view, triangles);
@@ -380,17 +406,14 @@ fn survey(vertices: &[RasterVertex], triangles: &Triangles) -> u32 {
 /// Whether a triangle is put into the grid.
 fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, prim: u32) -> bool {
     match casts {
-        Casts::Nothing => return false,
-        Casts::Both => return true,
-        Casts::Back => {}
+        Casts::Nothing => false,
+        Casts::Both => true,
+        Casts::Back => {
+            // What is not finite stays and is sorted out later.
+            let front = exact::side(triangles.corners(prim), light) > 0.0;
+            !front
+        }
     }
-    let normal = triangles.normal(prim);
-    let towards = light.towards(triangles.corners(prim)[0].as_dvec3());
-    let facing = normal.dot(towards);
-    let certain = normal.length() * towards.length() * 1e-12;
-    // What is not finite stays and is sorted out later.
-    let front = facing > certain;
-    !front
 }
 
 /// Set-ups done by one task.
@@ -417,7 +440,7 @@ fn set_up_all(
                     triangles.indices[prim as usize].map(|i| &vertices[i as usize]),
                 );
             }
-            set_up_casters(level, &lanes, Origin::OwnCorner, &mut edges);
+            set_up_casters(level, &lanes, view.rounding() as f32, &mut edges);
             for (lane, caster) in casters.iter_mut().enumerate() {
                 *caster = if edges.good & (1 << lane) != 0 {
                     let origin = [lanes.x[0][lane], lanes.y[0][lane]];

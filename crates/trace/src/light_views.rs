@@ -26,12 +26,21 @@ const CUBE_FACES: [[DVec3; 3]; 6] = [
     [DVec3::NEG_X, DVec3::Y, DVec3::NEG_Z],
 ];
 
+/// Coordinates beyond this are not projected: a few products of them leave the range of f32.
+const LARGEST: f64 = 1e30;
+
+/// A wider cone than this, in radians, is served like a light without one.
+const WIDEST_CONE: f64 = 1.5;
+
 /// The views of a light onto these triangles; none where there is nothing to see, or where the light has no
-/// finite position or direction.
-pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Vec<View> {
+/// finite position or direction. `None` if the geometry is too large to be projected.
+pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Option<Vec<View>> {
     let Some(bounds) = Bounds::of(triangles) else {
-        return Vec::new();
+        return Some(Vec::new());
     };
+    if bounds.min.abs().max(bounds.max.abs()).max_element() > LARGEST {
+        return None;
+    }
     let views = match *light {
         Light::Directional(direction) => {
             let forward = -direction.as_dvec3();
@@ -43,7 +52,7 @@ pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) ->
             }
         }
         Light::Point(position) if !position.is_finite() => Vec::new(),
-        Light::Point(position) => match cone {
+        Light::Point(position) => match cone.filter(|cone| cone.half_angle < WIDEST_CONE) {
             Some(cone) => {
                 let tan = (cone.half_angle.tan() * 1.001).clamp(1e-3, 1e3);
                 vec![unit_view(position, around(cone.axis), tan)]
@@ -56,10 +65,12 @@ pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) ->
             },
         },
     };
-    views
-        .into_iter()
-        .filter_map(|view| bounds.window(&view))
-        .collect()
+    Some(
+        views
+            .into_iter()
+            .filter_map(|view| bounds.window(&view))
+            .collect(),
+    )
 }
 
 /// A perspective view on a raster of one unit.

@@ -30,6 +30,8 @@ pub(crate) struct PreciseTriangle {
     nearness: DVec3,
     /// As `edge_errors`.
     nearness_error: f64,
+    /// See [`View::rounding`].
+    rounding: f64,
     /// Nearness above which a point is not certain to lie in front of the view's start.
     ceiling: f64,
 }
@@ -56,8 +58,18 @@ impl PreciseTriangle {
 
         // Sizes of the coordinates now, and of those whose rounding they carry.
         let size = points.map(|p| p.abs().element_sum());
+        let parallel = matches!(view.arrangement, Arrangement::Parallel { .. });
+        let center = view.center.as_dvec3();
         let scale = view.scale_x.abs().max(view.scale_y.abs());
-        let spans = corners.map(|c| (c.as_dvec3() - view.center.as_dvec3()).length() * scale);
+        let raster = view.middle[0].abs() + view.middle[1].abs() + f64::from(view.width + view.height);
+        let spans = corners.map(|c| {
+            let distance = (c.as_dvec3() - center).length();
+            if parallel {
+                (distance + center.length()) * scale + raster
+            } else {
+                distance * (scale + raster)
+            }
+        });
         let carried: [f64; 3] = std::array::from_fn(|i| homogeneous[i].p.abs().element_sum() + spans[i]);
         let error = |j: usize, k: usize| {
             PRODUCT_ERROR * (size[j] * size[k] + (carried[j] * size[k] + size[j] * carried[k]) / 8.0)
@@ -80,6 +92,7 @@ impl PreciseTriangle {
             edge_errors,
             nearness,
             nearness_error,
+            rounding: view.rounding(),
             ceiling,
         })
     }
@@ -90,14 +103,14 @@ impl PreciseTriangle {
         let (mut from, mut to) = (f64::NEG_INFINITY, f64::INFINITY);
         for (edge, error) in self.edges.iter().zip(self.edge_errors) {
             // Over the row, e(x, y) + error (|x| + |y| + 1) is at most rest + edge.x x + error |x|.
-            let y = if edge.y > 0.0 { bottom } else { top };
-            let rest = edge.y * y + edge.z + error * (y.abs() + 1.0);
+            let at = |y: f64| edge.y * y + error * (y.abs() + 1.0);
+            let rest = at(top).max(at(bottom)) + edge.z;
             if edge.x.abs() <= 2.0 * error {
                 continue;
             }
             // Where edge.x dominates, x beyond the root by its error's share cannot be inside.
             let root = -rest / edge.x;
-            let slack = root.abs() * (2.0 * error / edge.x.abs()) + root.abs() * 1e-12;
+            let slack = root.abs() * (2.0 * error / edge.x.abs()) + root.abs() * 1e-12 + self.rounding;
             if edge.x > 0.0 {
                 from = from.max(root - slack);
             } else {
@@ -146,7 +159,10 @@ impl PreciseTriangle {
         let [x, y] = [origin[0] - self.origin[0], origin[1] - self.origin[1]];
         let extent = x.abs() + y.abs() + 2.0 * reach + 1.0;
         let at_origin = |p: DVec3| DVec3::new(p.x, p.y, p.x * x + p.y * y + p.z);
-        let rounding = |p: DVec3| 8.0 * f64::from(ROUNDOFF) * ((p.x.abs() + p.y.abs()) * reach + p.z.abs());
+        let rounding = |p: DVec3| {
+            let slope = p.x.abs() + p.y.abs();
+            8.0 * f64::from(ROUNDOFF) * (slope * reach + p.z.abs()) + slope * self.rounding
+        };
         let mut record = EdgeRecord {
             prim,
             ..EdgeRecord::default()

@@ -2,6 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::ViewRay;
+
 /// A ray: points `origin + t * dir` with `t_min < t <= t_max`. 32 bytes; `dir` need not be normalised.
 ///
 /// A ray with a component that is not finite (but for `t_max`), or with a zero direction, hits nothing.
@@ -58,7 +60,7 @@ pub struct Hit {
 pub struct Receiver {
     /// The point.
     pub point: DVec3,
-    /// Bound on the distance between `point` and the true surface point.
+    /// Bound on the distance of `point` from the surface's plane.
     pub error: f64,
     /// The triangle the point lies on, or `u32::MAX` for a free point.
     pub prim: u32,
@@ -67,8 +69,14 @@ pub struct Receiver {
 impl Receiver {
     /// The receiver at parameter `t` of a ray (f64, see [`crate::exact::hit`]) on triangle `prim`.
     pub fn on_surface(ray: &Ray, t: f64, prim: u32) -> Self {
-        let origin = ray.origin.as_dvec3();
-        let along = ray.dir.as_dvec3() * t;
+        let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
+        Self::along(&ViewRay { origin, dir }, t, prim)
+    }
+
+    /// As [`Receiver::on_surface`], for a ray of a view.
+    pub fn along(ray: &ViewRay, t: f64, prim: u32) -> Self {
+        let ViewRay { origin, dir } = *ray;
+        let along = dir * t;
         // One rounding each for product and sum and a few for t make some 2^-50 of these magnitudes; 2^-40
         // leaves room for grazing views, where an error in depth grows by the inverse cosine.
         let error = (origin.abs() + along.abs()).max_element() * 2f64.powi(-40);

@@ -110,6 +110,26 @@ impl View {
         }
     }
 
+    /// Bound on the f64 error of a raster coordinate of a point within the raster, or of the ray through it, in
+    /// raster units. Below 1e-9 but for extremely narrow or far views.
+    pub fn rounding(&self) -> f64 {
+        let size = [f64::from(self.width), f64::from(self.height)];
+        let (scale, lateral) = (0..2).fold((0.0f64, 0.0f64), |(scale, lateral), axis| {
+            let s = [self.scale_x, self.scale_y][axis].abs();
+            let farthest = self.middle[axis]
+                .abs()
+                .max((size[axis] - self.middle[axis]).abs());
+            (scale.max(s), lateral.max(farthest / s))
+        });
+        let raster = self.middle[0].abs() + self.middle[1].abs() + size[0] + size[1];
+        let center = f64::from(self.center.abs().max_element());
+        let reach = match self.arrangement {
+            Arrangement::Perspective => (1.0 + lateral) * (1.0 + lateral),
+            Arrangement::Parallel { reach } => reach + lateral + center,
+        };
+        (scale * reach + raster) * 2f64.powi(-49)
+    }
+
     /// The ray through raster point (x, y).
     #[inline]
     pub fn ray(&self, x: f64, y: f64) -> ViewRay {

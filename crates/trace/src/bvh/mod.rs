@@ -22,7 +22,7 @@ use glam::{DVec3, Vec3};
 
 use crate::brute::{hit_in_range, rounded, write_sorted};
 use crate::exact::{self, ExactHit};
-use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles};
+use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles, ViewRay};
 use build::{Built, Leaf};
 use node::{INNER, WIDTH};
 use slab::Slab;
@@ -113,6 +113,18 @@ impl<'a> Bvh<'a> {
 
     /// [`Accel::shadowed`], counting the work.
     pub fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool {
+        self.each_shadow(receiver, light, count, |_| ControlFlow::Break(()))
+    }
+
+    /// Calls `visit` with the triangles between a receiver and a light, in no order that means anything, until it
+    /// breaks. Returns whether it did.
+    pub fn each_shadow(
+        &self,
+        receiver: &Receiver,
+        light: &Light,
+        count: &mut impl Count,
+        mut visit: impl FnMut(u32) -> ControlFlow<()>,
+    ) -> bool {
         // The same origins and directions as `exact::shadows`. A negative error bound would let crossings behind
         // either end count.
         let beyond = if receiver.error >= 0.0 { 0.0 } else { f64::INFINITY };
@@ -127,17 +139,34 @@ impl<'a> Bvh<'a> {
             return false;
         };
         let filter = Filter::new(origin, dir);
-        let mut found = false;
+        let mut broken = false;
         self.walk(&mut slab, count, |leaf, _| {
-            found = !filter.certain_miss(&leaf.corners)
+            let hidden = !filter.certain_miss(&leaf.corners)
                 && exact::shadows(&self.triangles, leaf.prim, receiver, light);
-            if found {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
+            if hidden && visit(leaf.prim).is_break() {
+                broken = true;
+                return ControlFlow::Break(());
             }
+            ControlFlow::Continue(())
         });
-        found
+        broken
+    }
+
+    /// All triangles in front of the start of an f64 ray, as parameters and ids in ascending order.
+    pub fn along(&self, ray: &ViewRay, count: &mut impl Count, hits: &mut Vec<(f64, u32)>) {
+        hits.clear();
+        let Some(mut slab) = Slab::new(ray.origin, ray.dir, 0.0, f64::INFINITY, self.reach) else {
+            return;
+        };
+        let filter = Filter::new(ray.origin, ray.dir);
+        self.walk(&mut slab, count, |leaf, _| {
+            if !filter.certain_miss(&leaf.corners) {
+                let hit = exact::hit(ray.origin, ray.dir, self.triangles.corners(leaf.prim));
+                hits.extend(hit.filter(|h| h.t > 0.0).map(|h| (h.t, leaf.prim)));
+            }
+            ControlFlow::Continue(())
+        });
+        hits.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
     fn slab(&self, ray: &Ray) -> Option<Slab> {

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::kernel::SimdLevel;
-use crate::test_meshes::{Mesh, axes, looking};
+use crate::test_meshes::{Mesh, Numbers, axes, looking};
 
 /// Closest triangle by testing all.
 fn brute(triangles: &Triangles, ray: &ViewRay) -> Option<u32> {
@@ -184,5 +184,45 @@ fn empty_input_gives_empty_tiles() {
         "empty",
         &Mesh::default(),
         looking(Vec3::Z, Vec3::ZERO, 0.5, [20, 20]),
+    );
+}
+
+/// Coordinates with so few bits that sums of a few are exact.
+fn coarse(p: Vec3) -> Vec3 {
+    (p * 1048576.0).round() / 1048576.0
+}
+
+#[test]
+fn an_eye_within_a_triangle_does_not_see_it() {
+    let mut numbers = Numbers(77);
+    for _ in 0..24 {
+        let mut mesh = Mesh::soup(3, 10, 0.5, 1.0);
+        let corners = [(); 3].map(|()| coarse(numbers.point()));
+        mesh.triangle(corners);
+        let eye = (corners[0] * 2.0 + corners[1] + corners[2]) * 0.25;
+        check_both(
+            "within",
+            &mesh,
+            looking(eye, eye + numbers.point(), 1.0, [16, 16]),
+        );
+    }
+}
+
+#[test]
+fn a_triangle_whose_volume_rounds_to_nothing_is_still_seen() {
+    let mut mesh = Mesh::default();
+    let far = [(-20.0, -20.0), (20.0, -20.0), (0.0, 20.0)];
+    mesh.triangle(far.map(|(x, y)| Vec3::new(x, y, -10.0)));
+    let thin = 1e-30;
+    mesh.triangle([
+        Vec3::new(-1.0, -thin, -2.0),
+        Vec3::new(1.0, -thin, -2.0),
+        Vec3::new(0.0, thin, -5.0),
+    ]);
+    let axes = [DVec3::X, DVec3::Y, DVec3::NEG_Z];
+    check_both(
+        "thin",
+        &mesh,
+        View::perspective(Vec3::ZERO, axes, [1.0, 1.0], [63, 63]),
     );
 }

@@ -20,7 +20,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use super::project::RasterVertex;
 use super::{LANES, NEARNESS_BAND, ROUNDOFF};
 
-/// What the kernels know of one triangle. 72 bytes.
+/// What the kernels know of one triangle. 60 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct EdgeRecord {
@@ -132,9 +132,10 @@ pub(crate) enum Origin {
 /// How far outside of a triangle's bounding rectangle its record is evaluated at most, on either axis.
 const MARGIN: f32 = 4.0;
 
-/// Sets up all lanes.
+/// Sets up all lanes. `rounding` bounds the f64 error of projected raster coordinates, see
+/// [`crate::view::View::rounding`].
 #[inline(always)]
-pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mut EdgeLanes) {
+pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, rounding: f32, out: &mut EdgeLanes) {
     let splat = |value: f32| f32x16::splat(simd, value);
     let load = |lanes: &[f32; LANES]| f32x16::from_slice(simd, lanes);
     let x = [load(&v.x[0]), load(&v.x[1]), load(&v.x[2])];
@@ -145,7 +146,7 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, out: &mu
     let (w, h) = (x_max - x_min, y_max - y_min);
     let largest = x_min.abs().max(x_max.abs()).max(y_min.abs().max(y_max.abs()));
     // Half an ulp of the largest coordinate: vertices, and raster points that were projected themselves.
-    let eps = largest * splat(1.05 * ROUNDOFF);
+    let eps = largest * splat(1.05 * ROUNDOFF) + splat(rounding);
     let (ox, oy, reach) = match origin {
         Origin::Point { x, y, reach } => (splat(x), splat(y), splat(reach)),
         Origin::OwnCorner => (x[0], y[0], splat(MARGIN)),

@@ -8,7 +8,7 @@ use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
 use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
 use super::{LANES, NEARNESS_BAND, SimdLevel};
 
-/// A caster: its record relative to `origin`, a raster point of its own. 80 bytes.
+/// A caster: its record relative to `origin`, a raster point of its own. 68 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)]
 pub(crate) struct Caster {
@@ -38,8 +38,8 @@ impl Default for PointLanes {
 }
 
 /// Sets up sixteen casters.
-pub(crate) fn set_up_casters(level: SimdLevel, vertices: &VertexLanes, origin: Origin, out: &mut EdgeLanes) {
-    dispatch!(level.0, simd => set_up(simd, vertices, origin, out));
+pub(crate) fn set_up_casters(level: SimdLevel, vertices: &VertexLanes, rounding: f32, out: &mut EdgeLanes) {
+    dispatch!(level.0, simd => set_up(simd, vertices, Origin::OwnCorner, rounding, out));
 }
 
 /// Tests the `open` points (a bit each) against the casters `refs` until all are shadowed. Returns those that are
@@ -81,7 +81,7 @@ fn shadowed_impl<S: Simd>(
             continue;
         }
         let n = plane(record.nearness_x, record.nearness_y, record.nearness);
-        let vague = n.simd_lt(splat(record.floor)) | n.simd_gt(splat(record.ceiling));
+        let vague = !(n.simd_ge(splat(record.floor)) & n.simd_le(splat(record.ceiling)));
         let possible = covered & ((n * farther).simd_ge(nearness) | vague);
         let mut candidates = possible.to_bitmask() as u32 & open;
         if candidates == 0 {

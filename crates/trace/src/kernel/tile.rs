@@ -57,17 +57,26 @@ impl TileBuffer {
     }
 }
 
+/// Where a tile lies.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TilePlace {
+    /// Raster point of its corner.
+    pub(crate) origin: [u32; 2],
+    /// Columns and rows of blocks.
+    pub(crate) blocks: [u32; 2],
+    /// See [`crate::view::View::rounding`].
+    pub(crate) rounding: f32,
+}
+
 /// Draws up to sixteen projected triangles; returns a bit for every lane that could not be set up.
-/// `origin` is the raster point of the tile's corner and `side` its size in pixels.
 pub(crate) fn draw_batch(
     level: SimdLevel,
     tile: &mut TileBuffer,
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
-    origin: [u32; 2],
-    blocks: [u32; 2],
+    place: &TilePlace,
 ) -> u32 {
-    dispatch!(level.0, simd => draw_batch_impl(simd, tile, vertices, edges, origin, blocks))
+    dispatch!(level.0, simd => draw_batch_impl(simd, tile, vertices, edges, place))
 }
 
 #[inline(always)]
@@ -76,12 +85,22 @@ fn draw_batch_impl<S: Simd>(
     tile: &mut TileBuffer,
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
-    origin: [u32; 2],
-    blocks: [u32; 2],
+    place: &TilePlace,
 ) -> u32 {
+    let TilePlace {
+        origin,
+        blocks,
+        rounding,
+    } = *place;
     let [ox, oy] = origin.map(|v| v as f32);
     let reach = (blocks[0].max(blocks[1]) * BLOCK) as f32;
-    set_up(simd, vertices, Origin::Point { x: ox, y: oy, reach }, edges);
+    set_up(
+        simd,
+        vertices,
+        Origin::Point { x: ox, y: oy, reach },
+        rounding,
+        edges,
+    );
     let lanes = u32::MAX >> (32 - vertices.count as u32);
     let mut good = edges.good & lanes;
     let bad = lanes & !good;
@@ -158,8 +177,8 @@ fn draw_impl<S: Simd>(simd: S, tile: &mut TileBuffer, record: &EdgeRecord, rect:
             let block = row + bx as usize;
             let nearness = base_nearness + splat(record.nearness_x * x + record.nearness_y * y);
             let stored = f32x16::from_slice(simd, &tile.nearness[block]);
-            // A plane below its floor is not known well enough to be called hidden.
-            let vague = nearness.simd_lt(splat(record.floor)) | nearness.simd_gt(splat(record.ceiling));
+            // A plane outside of its range, or of unknown range, is not known well enough to be called hidden.
+            let vague = !(nearness.simd_ge(splat(record.floor)) & nearness.simd_le(splat(record.ceiling)));
             let possible = covered & ((nearness * farther).simd_ge(stored) | vague);
             if possible.all_false() {
                 continue;

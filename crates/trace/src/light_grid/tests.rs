@@ -205,3 +205,56 @@ fn nothing_and_nonsense_shadow_nothing() {
         check("nonsense", &soup, &receivers, light, &|_| Casts::Both);
     }
 }
+
+#[test]
+fn a_light_within_a_triangle_is_not_hidden_by_it() {
+    let mut numbers = Numbers(91);
+    let coarse = |p: Vec3| (p * 1048576.0).round() / 1048576.0;
+    for _ in 0..40 {
+        let mut mesh = Mesh::soup(3, 10, 0.5, 1.0);
+        let corners = [(); 3].map(|()| coarse(numbers.point()));
+        mesh.triangle(corners);
+        let light = Light::Point((corners[0] * 2.0 + corners[1] + corners[2]) * 0.25);
+        let receivers = [(); 40].map(|()| Receiver::free((numbers.point() * 2.0).as_dvec3()));
+        check("within", &mesh, &receivers, light, &|_| Casts::Both);
+    }
+}
+
+#[test]
+fn lights_as_far_as_the_sun() {
+    let mesh = Mesh::soup(13, 200, 0.3, 1.0);
+    let triangles = mesh.triangles();
+    let mut numbers = Numbers(55);
+    for distance in [1e6, 1e9, 1e10, 1.5e11] {
+        let position = Vec3::new(0.4, 0.8, -0.45) * distance;
+        // Just inside of edges, some way behind the triangle.
+        let receivers: Vec<Receiver> = (0..1000)
+            .map(|i| {
+                let [a, b, c] = triangles.corners(i % 200).map(Vec3::as_dvec3);
+                let share = f64::from(numbers.next()).abs();
+                let edge = a + (b - a) * share;
+                let inside = edge + (c - edge) * 1e-6 * f64::from(numbers.next()).abs();
+                Receiver::free(inside - (position.as_dvec3() - inside).normalize() * 2.0)
+            })
+            .collect();
+        check("far", &mesh, &receivers, Light::Point(position), &|_| Casts::Both);
+    }
+}
+
+#[test]
+fn a_huge_vertex_does_not_take_the_shadows() {
+    for huge in [1e29, 1e31, 3.4e38] {
+        let mut mesh = Mesh::default();
+        let over = |x: f32, z: f32| Vec3::new(x, 0.5, z);
+        mesh.triangle([over(-1.0, -1.0), over(1.0, -1.0), over(0.0, 1.0)]);
+        mesh.triangle([
+            Vec3::new(5.0, 0.0, 0.0),
+            Vec3::new(huge, 1.0, 0.0),
+            Vec3::new(5.0, 1.0, 1.0),
+        ]);
+        let receivers = [(0.0, 0.0), (0.0, 9.0)].map(|(x, z)| Receiver::free(DVec3::new(x, -1.0, z)));
+        for light in [Light::Point(Vec3::Y), Light::Directional(Vec3::Y)] {
+            check("huge", &mesh, &receivers, light, &|_| Casts::Both);
+        }
+    }
+}
