@@ -3,6 +3,25 @@
 //!
 //! Units: metres, radians, candela, lux; right-handed, +Y up; row 0 of every image on top; linear colours with
 //! the primaries of sRGB until the tone map.
+//!
+//! ```no_run
+//! use std::path::Path;
+//!
+//! use rayward::{RenderOptions, Renderer, ToneMap, ToneMapper, image_io, scene};
+//!
+//! fn main() -> rayward::Result<()> {
+//!     // A file: scene::load(Path::new("model.glb"), &scene::LoadOptions::default())?
+//!     let scene = scene::builtin::build("courtyard")?;
+//!     let frame = scene.at(1.5); // seconds
+//!     let options = RenderOptions { width: 640, height: 360, ..RenderOptions::default() };
+//!
+//!     let mut renderer = Renderer::new(&scene);
+//!     let rendered = renderer.render(&frame, &frame.cameras[0], &frame.lights, &options, &|_progress| {})?;
+//!
+//!     let rgb = ToneMapper::new(ToneMap::None).encode(&rendered.film);
+//!     image_io::write_png(Path::new("courtyard.png"), options.width, options.height, &rgb)
+//! }
+//! ```
 
 mod camera;
 mod casters;
