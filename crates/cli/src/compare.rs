@@ -1,5 +1,7 @@
 //! `rayward compare`: how much two pictures differ.
 
+use std::path::Path;
+
 use rayward::image_io::write_png;
 use rayward::{CompareOptions, Comparison, read_picture};
 use serde::Serialize;
@@ -41,6 +43,17 @@ struct Largest {
 
 /// Compares, tells, and fails beyond the tolerance.
 pub(crate) fn run(args: &CompareArgs) -> std::result::Result<(), Failure> {
+    if let Some(path) = &args.difference
+        && [&args.a, &args.b].into_iter().any(|input| same_file(path, input))
+    {
+        return Err(Failure::new(
+            Code::Usage,
+            format_args!(
+                "--difference {} would overwrite a picture to compare",
+                path.display()
+            ),
+        ));
+    }
     let (a, b) = (read_picture(&args.a)?, read_picture(&args.b)?);
     let comparison = rayward::compare(&a, &b, &CompareOptions::default())?;
     if let Some(path) = &args.difference {
@@ -58,6 +71,11 @@ pub(crate) fn run(args: &CompareArgs) -> std::result::Result<(), Failure> {
     } else {
         Err(Failure::silent(Code::Beyond))
     }
+}
+
+/// Whether two paths lead to one file; no, if either leads nowhere.
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
 /// Whether it passes. A mean that is not a number is not within any tolerance.

@@ -36,6 +36,16 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let pose_start = Instant::now();
     let frame = input.pose(&args.moment)?;
     let pose = pose_start.elapsed();
+    if frame.triangle_count() == 0 {
+        let (broken, flat) = (frame.dropped_non_finite, frame.dropped_degenerate);
+        return Err(Failure::new(
+            Code::Input,
+            format_args!(
+                "{}: no triangles are left: {broken} not finite, {flat} without area",
+                input.path.display()
+            ),
+        ));
+    }
     let aspect = f64::from(options.width) / f64::from(options.height);
     let view = View::choose(&args.view, &input, &frame, aspect)?;
 

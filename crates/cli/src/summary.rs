@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use rayward::scene::{Material, Scene};
 use rayward::{FrameStats, RenderOptions};
 use serde::Serialize;
 
@@ -81,6 +82,7 @@ impl Summary {
         let rays = (stats.eye_rays + stats.shadow_rays) as f64;
         let mut notices: Vec<_> = input.scene.notices.iter().map(ToString::to_string).collect();
         notices.extend(view.notices());
+        notices.extend(not_shaded(&input.scene));
         if moment.time != 0.0 && input.scene.animations.is_empty() {
             notices.push("--time: the scene has no animation".into());
         }
@@ -222,4 +224,24 @@ impl From<&rayward::StructureStats> for Structure {
             references: stats.references,
         }
     }
+}
+
+/// What materials ask for that is not rendered, each said once.
+pub(crate) fn not_shaded(scene: &Scene) -> Vec<String> {
+    let count = |asks: fn(&Material) -> bool| scene.materials.iter().filter(|m| asks(m)).count();
+    let transmitting = count(|m| m.transmission > 0.0);
+    let mirrors =
+        count(|m| m.metallic >= 0.9 && m.roughness <= 0.1 && m.metallic_roughness_texture.is_none());
+    let mut notices = Vec::new();
+    if transmitting > 0 {
+        notices.push(format!(
+            "{transmitting} materials transmit light: they are shown opaque"
+        ));
+    }
+    if mirrors > 0 {
+        notices.push(format!(
+            "{mirrors} materials are mirrors: reflections are not traced"
+        ));
+    }
+    notices
 }

@@ -240,3 +240,15 @@ fn broken_files_of_others_end_with_0_3_or_4() {
         assert!(folder.names().is_empty(), "{name} leaves {:?}", folder.names());
     }
 }
+
+#[test]
+fn a_scene_without_a_usable_triangle_is_an_error() {
+    let folder = Folder::new();
+    let file = folder.file("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+    let run = render(&folder, &file, 3);
+    assert!(
+        run.stderr.contains("flat.obj") && run.stderr.contains("1 without area"),
+        "{}",
+        run.stderr
+    );
+}

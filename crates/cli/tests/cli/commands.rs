@@ -281,3 +281,59 @@ fn an_interrupt_leaves_nothing_behind() {
     assert_eq!(child.wait().expect("the program ends").code(), Some(130));
     assert!(folder.names().is_empty(), "{:?}", folder.names());
 }
+
+#[test]
+fn compare_neither_overwrites_its_inputs_nor_reads_without_end() {
+    let folder = Folder::new();
+    for name in ["a.png", "b.png"] {
+        folder
+            .run(&[
+                "render",
+                "--builtin",
+                "blob-1k",
+                "--resolution",
+                "16x12",
+                "-q",
+                "-o",
+                name,
+            ])
+            .expect(0);
+    }
+    let before = std::fs::read(folder.path("a.png")).expect("a picture");
+    folder
+        .run(&["compare", "a.png", "b.png", "--difference", "./a.png"])
+        .expect(2);
+    assert_eq!(std::fs::read(folder.path("a.png")).expect("a picture"), before);
+    #[cfg(unix)]
+    {
+        let endless = folder.run(&["compare", "a.png", "/dev/zero"]).expect(3);
+        assert!(
+            endless.stderr.contains("not a regular file"),
+            "{}",
+            endless.stderr
+        );
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn an_existing_picture_keeps_its_permissions() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = Folder::new();
+    let path = folder.file("a.png", "old");
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o600)).expect("its own file");
+    folder
+        .run(&[
+            "render",
+            "--builtin",
+            "blob-1k",
+            "--resolution",
+            "16x12",
+            "-q",
+            "-o",
+            "a.png",
+        ])
+        .expect(0);
+    let mode = std::fs::metadata(&path).expect("a picture").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+}

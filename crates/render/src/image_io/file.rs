@@ -10,8 +10,8 @@ use crate::{Error, Result};
 pub(super) trait Sink: Write + Seek {}
 impl<T: Write + Seek> Sink for T {}
 
-/// Fills the file at `path` by `encode`. An existing file is replaced only when all is written; symbolic links
-/// are followed, devices and pipes are written directly.
+/// Fills the file at `path` by `encode`. An existing file is replaced only when all is written, and
+/// keeps its permissions; symbolic links are followed, devices and pipes are written directly.
 pub(super) fn write(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>) -> Result<()> {
     write_inner(path, encode).map_err(|source| Error::write(path, source))
 }
@@ -19,6 +19,7 @@ pub(super) fn write(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Resul
 fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>) -> io::Result<()> {
     let resolved = fs::canonicalize(path);
     let target = resolved.as_deref().unwrap_or(path);
+    let mut kept = None;
     match fs::metadata(target) {
         Ok(found) if found.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
         Ok(found) if !found.is_file() => {
@@ -31,7 +32,8 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
                 .write_all(bytes.get_ref());
         }
         Ok(found) if found.permissions().readonly() => return Err(io::ErrorKind::PermissionDenied.into()),
-        _ => {}
+        Ok(found) => kept = Some(found.permissions()),
+        Err(_) => {}
     }
     let folder = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -46,6 +48,9 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     let mut buffered = BufWriter::with_capacity(1 << 16, builder.tempfile_in(folder)?);
+    if let Some(permissions) = kept {
+        buffered.get_ref().as_file().set_permissions(permissions)?;
+    }
     encode(&mut buffered)?;
     buffered
         .into_inner()
@@ -55,9 +60,19 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
     Ok(())
 }
 
-/// The whole content of a file.
+/// The whole content of a regular file; a pipe or a device may never end.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    fs::read(path).map_err(|source| Error::read(path, source))
+    let regular = |found: fs::Metadata| {
+        if found.is_dir() || found.is_file() {
+            Ok(())
+        } else {
+            Err(io::Error::other("it is not a regular file"))
+        }
+    };
+    fs::metadata(path)
+        .and_then(regular)
+        .and_then(|()| fs::read(path))
+        .map_err(|source| Error::read(path, source))
 }
 
 #[cfg(test)]
