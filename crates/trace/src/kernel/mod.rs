@@ -34,7 +34,7 @@ impl SimdLevel {
     }
 
     /// Every level that runs on this machine, best first. The scalar fallback is among them only where it is
-    /// the baseline, or in tests.
+    /// the baseline, or with the feature `scalar`.
     pub fn available() -> Vec<Self> {
         let best = Level::new();
         let mut levels = Vec::new();
@@ -47,7 +47,7 @@ impl SimdLevel {
         }
         #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
         levels.push(best);
-        #[cfg(test)]
+        #[cfg(feature = "scalar")]
         levels.push(Level::fallback());
         levels.into_iter().map(Self).collect()
     }
