@@ -14,8 +14,8 @@ use divan::counter::ItemsCount;
 use rayward::CameraFrame;
 use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
-    Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver, ShadowScratch,
-    SimdLevel, TileHits, Triangles, View, exact,
+    Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver,
+    ShadowScratch, SimdLevel, TileHits, Triangles, View, exact,
 };
 
 fn main() {
@@ -60,6 +60,8 @@ fn is_test() -> bool {
 struct Frame {
     name: String,
     geometry: FrameGeometry,
+    /// Found once, as an animation would.
+    clusters: Clusters,
     camera: PosedCamera,
     light: PosedLight,
 }
@@ -80,6 +82,7 @@ fn load(name: &str) -> Frame {
         let (camera, light) = (geometry.cameras[0].clone(), geometry.lights[0].clone());
         return Frame {
             name: name.into(),
+            clusters: Clusters::new(&triangles(&geometry)),
             geometry,
             camera,
             light,
@@ -95,6 +98,7 @@ fn load(name: &str) -> Frame {
         .at(0.0);
     Frame {
         name: name.into(),
+        clusters: Clusters::new(&triangles(&geometry)),
         geometry,
         camera: entry.camera(),
         light: entry.lights().remove(0),
@@ -124,9 +128,10 @@ fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
 /// Closest triangles of all pixels, given to `see` tile by tile as receivers.
 fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver])) {
     let triangles = triangles(&frame.geometry);
-    let grid = EyeGrid::build(
+    let grid = EyeGrid::build_clustered(
         view(frame),
         triangles,
+        &frame.clusters,
         EyeGridOptions::default(),
         SimdLevel::detect(),
     );
@@ -155,7 +160,8 @@ fn eye(bencher: Bencher, name: &str) {
         bencher
             .counter(ItemsCount::new(view.width * view.height))
             .bench_local(|| {
-                let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), SimdLevel::detect());
+                let (clusters, options) = (&frame.clusters, EyeGridOptions::default());
+                let grid = EyeGrid::build_clustered(view, triangles, clusters, options, SimdLevel::detect());
                 let mut hits = TileHits::default();
                 for index in 0..grid.tile_count() {
                     grid.trace_tile(&grid.tile(index), &mut hits);

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
-use rayward_trace::{Light, Topology, View};
+use rayward_trace::{Clusters, Light, Topology, View};
 
 use crate::casters::{CasterRules, triangles};
 use crate::plan::FramePlan;
@@ -14,12 +14,12 @@ use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
 use crate::{CameraFrame, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
 
-/// Renders frames of one scene. Keeps what outlives a frame: materials, textures and the topology.
+/// Renders frames of one scene. Keeps what outlives a frame: materials, textures, the topology and clusters.
 #[derive(Debug)]
 pub struct Renderer<'s> {
     scene: &'s Scene,
     shader: Shader<'s>,
-    topology: Option<(Vec<[u32; 3]>, Topology)>,
+    topology: Option<(Vec<[u32; 3]>, Topology, Clusters)>,
 }
 
 /// A rendered frame.
@@ -71,12 +71,12 @@ impl<'s> Renderer<'s> {
         let view = view(&camera, geometry);
         let start = Instant::now();
         self.update_topology(geometry);
-        let topology = &self.topology.as_ref().expect("just updated").1;
+        let (_, topology, clusters) = self.topology.as_ref().expect("just updated");
         let eye = (!camera.orthographic).then(|| camera.eye.as_dvec3());
         let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
 
         let plan = FramePlan::new(geometry, lights, options);
-        let structures = FrameStructures::build(&plan, view, geometry, &rules, options);
+        let structures = FrameStructures::build(&plan, view, geometry, clusters, &rules, options);
         let build = start.elapsed();
 
         let start = Instant::now();
@@ -126,12 +126,18 @@ impl<'s> Renderer<'s> {
         Ok(RenderedFrame { film, stats })
     }
 
-    /// Finds the components anew only where the triangles are others than in the last frame.
+    /// Finds the components and clusters anew only where the triangles are others than in the last frame.
     fn update_topology(&mut self, geometry: &FrameGeometry) {
         let triangles = triangles(geometry);
         match &mut self.topology {
-            Some((indices, topology)) if *indices == geometry.indices => topology.update(&triangles),
-            other => *other = Some((geometry.indices.clone(), Topology::analyse(&triangles))),
+            Some((indices, topology, _)) if *indices == geometry.indices => topology.update(&triangles),
+            other => {
+                *other = Some((
+                    geometry.indices.clone(),
+                    Topology::analyse(&triangles),
+                    Clusters::new(&triangles),
+                ));
+            }
         }
     }
 }

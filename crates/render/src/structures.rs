@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
-use rayward_trace::{Bvh, EyeGrid, PointLightGrid, View};
+use rayward_trace::{Bvh, Clusters, EyeGrid, PointLightGrid, View};
 
 use crate::casters::{CasterRules, triangles};
 use crate::plan::FramePlan;
@@ -28,6 +28,7 @@ impl<'g> FrameStructures<'g> {
         plan: &FramePlan,
         view: View,
         geometry: &'g FrameGeometry,
+        clusters: &'g Clusters,
         rules: &CasterRules,
         options: &RenderOptions,
     ) -> Self {
@@ -35,7 +36,11 @@ impl<'g> FrameStructures<'g> {
         let mut stats = Vec::new();
 
         let start = Instant::now();
-        let eye = EyeGrid::build(view, triangles, plan.eye, options.level);
+        let eye = if plan.eye.hierarchy {
+            EyeGrid::build_clustered(view, triangles, clusters, plan.eye, options.level)
+        } else {
+            EyeGrid::build(view, triangles, plan.eye, options.level)
+        };
         stats.push(StructureStats {
             name: "eye grid".into(),
             build: start.elapsed(),

@@ -58,19 +58,30 @@ fn volume(a: DVec3, b: DVec3, d: DVec3) -> f64 {
 /// `None` for triangles without area and for rays within the triangle's plane.
 #[inline]
 pub fn hit(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<ExactHit> {
-    let [a0, a1, a2] = corners.map(|v| v.as_dvec3() - origin);
+    if meets(origin, dir, corners) {
+        attributes(origin, dir, corners)
+    } else {
+        None
+    }
+}
+
+/// The decision of [`hit`] alone, for triangles with area.
+#[inline]
+pub(crate) fn meets(origin: DVec3, dir: DVec3, [v0, v1, v2]: [Vec3; 3]) -> bool {
+    let [a0, a1, a2] = [
+        v0.as_dvec3() - origin,
+        v1.as_dvec3() - origin,
+        v2.as_dvec3() - origin,
+    ];
     let e0 = volume(a1, a2, dir);
     let e1 = volume(a2, a0, dir);
     if e0 * e1 < 0.0 {
-        return None;
+        return false;
     }
     let e2 = volume(a0, a1, dir);
     let negative = e0 < 0.0 || e1 < 0.0 || e2 < 0.0;
     let positive = e0 > 0.0 || e1 > 0.0 || e2 > 0.0;
-    if negative == positive {
-        return None;
-    }
-    attributes(origin, dir, corners)
+    negative != positive
 }
 
 /// Where the line o + t d meets the triangle, given that it does: the same values as [`hit`], without the

@@ -17,6 +17,7 @@ mod accel;
 mod bins;
 pub mod brute;
 pub mod bvh;
+mod clusters;
 pub mod exact;
 mod eye_grid;
 mod kernel;
@@ -35,8 +36,10 @@ pub use accel::{Accel, BuildStats, Count, Counters};
 pub use bins::Binning;
 pub use brute::BruteForce;
 pub use bvh::Bvh;
-pub use eye_grid::{EyeGrid, EyeGridOptions, Tile, TileHits};
+pub use clusters::Clusters;
+pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use kernel::SimdLevel;
+pub use kernel::tile::BlockPixels;
 pub use light_grid::{
     CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };

@@ -3,11 +3,12 @@
 //! In homogeneous raster coordinates `p_i` = (x, y, w) the edge functions are `p_j x p_k` dotted with (x, y, 1)
 //! (Olano and Greer 1997): no clipping is needed for triangles that reach behind the center of projection. Their
 //! sign is oriented so that every ray that hits (t > 0) sees all three non-negative; that orientation is exact.
-//! Nearness is `sum(m_i E_i) / det`. The raster's origin is moved next to the triangle first, so that products of
+//! Nearness comes from the plane's normal N: `(d . N) / (a_0 . N)` for the ray direction d and corner `a_0` from the
+//! center, which is off by little unless the center nearly lies in the plane. The raster's origin is moved next to the triangle first, so that products of
 //! coordinates stay small and errors with them. Cost: some 150 operations; used for triangles that cross the
 //! center's plane, lie far outside of the raster or are nearly edge-on, and to bin large ones.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 use robust::{Coord3D, orient3d};
 
 use crate::kernel::edges::EdgeRecord;
@@ -16,6 +17,60 @@ use crate::view::{Arrangement, View};
 
 /// Bound on the relative f64 error of a product of two sums of a few terms; generous.
 const PRODUCT_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
+
+/// Nearness over the raster, and its error: a share of itself and a constant.
+#[derive(Clone, Copy, Debug)]
+struct NearnessPlane {
+    /// Coefficients (of x, of y, constant) from the triangle's origin.
+    plane: DVec3,
+    share: f64,
+    constant: f64,
+}
+
+impl NearnessPlane {
+    fn new(view: &View, [v0, v1, v2]: [Vec3; 3], origin: [f64; 2]) -> Self {
+        let (v0, v1, v2) = (v0.as_dvec3(), v1.as_dvec3(), v2.as_dvec3());
+        let (edge1, edge2, a0) = (v1 - v0, v2 - v0, v0 - view.center.as_dvec3());
+        let normal = edge1.cross(edge2);
+        let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
+        // Bound on the error of the normal's dot product with a vector below `v`.
+        let doubt = |v: DVec3| terms.dot(v) * 2f64.powi(-48);
+        let (right, up) = (view.right / view.scale_x, view.up / view.scale_y);
+        let [cx, cy] = view.middle;
+        let offset = right * (origin[0] - cx) + up * (cy - origin[1]);
+        let farthest = |middle: f64, size: u32| middle.abs().max((f64::from(size) - middle).abs());
+        let offsets = right.abs() * farthest(cx, view.width) + up.abs() * farthest(cy, view.height);
+        match view.arrangement {
+            Arrangement::Perspective => {
+                let height = a0.dot(normal);
+                Self {
+                    plane: DVec3::new(
+                        right.dot(normal),
+                        -up.dot(normal),
+                        (view.forward + offset).dot(normal),
+                    ) / height,
+                    share: doubt(a0.abs()) / height.abs(),
+                    constant: doubt(view.forward.abs() + offsets) / height.abs(),
+                }
+            }
+            Arrangement::Parallel { reach } => {
+                let steepness = view.forward.dot(normal);
+                let depth = (a0 - offset).dot(normal) / steepness;
+                Self {
+                    plane: DVec3::new(
+                        right.dot(normal) / steepness,
+                        -up.dot(normal) / steepness,
+                        reach - depth,
+                    ),
+                    share: 0.0,
+                    constant: (doubt(a0.abs() + offsets) + reach * doubt(view.forward.abs()))
+                        / steepness.abs()
+                        + reach * 2f64.powi(-48),
+                }
+            }
+        }
+    }
+}
 
 /// Edge functions, nearness plane and their error bounds.
 #[derive(Clone, Copy, Debug)]
@@ -27,9 +82,7 @@ pub(crate) struct PreciseTriangle {
     edges: [DVec3; 3],
     /// Bound on the error of each edge function, per unit of |x| + |y| + 1.
     edge_errors: [f64; 3],
-    nearness: DVec3,
-    /// As `edge_errors`.
-    nearness_error: f64,
+    nearness: NearnessPlane,
     /// See [`View::rounding`].
     rounding: f64,
     /// Nearness above which a point is not certain to lie in front of the view's start.
@@ -75,12 +128,7 @@ impl PreciseTriangle {
             PRODUCT_ERROR * (size[j] * size[k] + (carried[j] * size[k] + size[j] * carried[k]) / 8.0)
         };
         let edge_errors = [error(1, 2), error(2, 0), error(0, 1)];
-        let det = p0.dot(edges[0]).max(f64::MIN_POSITIVE);
-        let det_error = (size[0] * edge_errors[0] + PRODUCT_ERROR * carried[0] * size[1] * size[2]) / det;
-        let m = homogeneous.map(|h| h.m);
-        let nearness = (edges[0] * m[0] + edges[1] * m[1] + edges[2] * m[2]) / det;
-        let sum_error: f64 = (0..3).map(|i| m[i].abs() * edge_errors[i]).sum::<f64>() / det;
-        let nearness_error = sum_error + nearness.abs().max_element() * det_error;
+        let plane = NearnessPlane::new(view, corners, origin);
         let ceiling = match view.arrangement {
             Arrangement::Perspective => f64::INFINITY,
             Arrangement::Parallel { reach } => reach * (1.0 - f64::from(NEARNESS_BAND)),
@@ -90,8 +138,7 @@ impl PreciseTriangle {
             points,
             edges,
             edge_errors,
-            nearness,
-            nearness_error,
+            nearness: plane,
             rounding: view.rounding(),
             ceiling,
         })
@@ -172,11 +219,15 @@ impl PreciseTriangle {
             let edge = edge / (1.01 * (self.edge_errors[i] * extent + rounding(edge)));
             (record.a[i], record.b[i], record.c[i]) = (edge.x as f32, edge.y as f32, edge.z as f32);
         }
-        let plane = at_origin(self.nearness);
+        let plane = at_origin(self.nearness.plane);
         (record.nearness_x, record.nearness_y, record.nearness) =
             (plane.x as f32, plane.y as f32, plane.z as f32);
-        let error = self.nearness_error * extent + rounding(plane);
-        record.floor = (error * 4.0 / f64::from(NEARNESS_BAND)) as f32;
+        let share = f64::from(NEARNESS_BAND) / 4.0 - self.nearness.share;
+        record.floor = if share > f64::from(NEARNESS_BAND) / 8.0 {
+            ((self.nearness.constant + rounding(plane)) / share) as f32
+        } else {
+            f32::INFINITY
+        };
         record.ceiling = self.ceiling as f32;
         record
     }

@@ -69,6 +69,14 @@ pub struct Homogeneous {
     pub m: f64,
 }
 
+/// A rectangle of the raster, and a bound on the nearness of what it shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Window {
+    pub(crate) min: [f64; 2],
+    pub(crate) max: [f64; 2],
+    pub(crate) nearest: f64,
+}
+
 impl View {
     /// A perspective view whose half angles have the tangents `tan_x` and `tan_y`.
     pub fn perspective(center: Vec3, axes: [DVec3; 3], tan: [f64; 2], size: [u32; 2]) -> Self {
@@ -178,6 +186,68 @@ impl View {
         match self.arrangement {
             Arrangement::Perspective => 1.0 / depth,
             Arrangement::Parallel { reach } => reach - depth,
+        }
+    }
+
+    /// Where the raster shows a box; all of it where the box reaches behind the start of the view. `None` if nothing
+    /// of the box lies in front.
+    pub(crate) fn window_of_box(&self, low: DVec3, high: DVec3) -> Option<Window> {
+        let corner = |i: usize| {
+            let pick = |bit: usize, low: f64, high: f64| if i & bit == 0 { low } else { high };
+            DVec3::new(
+                pick(1, low.x, high.x),
+                pick(2, low.y, high.y),
+                pick(4, low.z, high.z),
+            )
+        };
+        let nearest = self.nearest_in_box(low, high);
+        let all = Window {
+            min: [0.0; 2],
+            max: [f64::from(self.width), f64::from(self.height)],
+            nearest,
+        };
+        // A box that is not finite, or whose depth is not certain to be positive, may be anywhere.
+        if !(low.is_finite() && high.is_finite() && nearest.is_finite()) {
+            let center = self.center.as_dvec3();
+            let behind = (0..8).all(|i| (corner(i) - center).dot(self.forward) < 0.0);
+            return (!behind).then_some(all);
+        }
+        let window = self.window_of((0..8).map(corner));
+        Some(window.map_or(all, |w| Window { nearest, ..w }))
+    }
+
+    /// Smallest window that holds these points; `None` if one does not lie in front.
+    pub(crate) fn window_of(&self, points: impl Iterator<Item = DVec3>) -> Option<Window> {
+        let mut window = Window {
+            min: [f64::INFINITY; 2],
+            max: [f64::NEG_INFINITY; 2],
+            nearest: 0.0,
+        };
+        for point in points {
+            let h = self.homogeneous(point);
+            let inverse = 1.0 / h.p.z;
+            if !(h.p.z > 0.0 && inverse.is_finite()) {
+                return None;
+            }
+            let [x, y] = [h.p.x * inverse, h.p.y * inverse];
+            window.min = [window.min[0].min(x), window.min[1].min(y)];
+            window.max = [window.max[0].max(x), window.max[1].max(y)];
+            window.nearest = window.nearest.max(h.m * inverse);
+        }
+        Some(window)
+    }
+
+    /// Bound on the nearness of all points of a box that lie in front.
+    pub(crate) fn nearest_in_box(&self, low: DVec3, high: DVec3) -> f64 {
+        let center = self.center.as_dvec3();
+        let products = |corner: DVec3| (corner - center) * self.forward;
+        let (a, b) = (products(low), products(high));
+        let rounding = (a.abs() + b.abs()).element_sum() * 2f64.powi(-50);
+        let depth = a.min(b).element_sum() - rounding;
+        match self.arrangement {
+            Arrangement::Perspective if depth > 0.0 => 1.0 / depth,
+            Arrangement::Perspective => f64::INFINITY,
+            Arrangement::Parallel { reach } => reach - depth.max(0.0),
         }
     }
 }

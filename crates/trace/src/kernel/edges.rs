@@ -18,7 +18,7 @@
 use fearless_simd::{Simd, f32x16, prelude::*};
 
 use super::project::RasterVertex;
-use super::{LANES, NEARNESS_BAND, ROUNDOFF};
+use super::{LANES, NEARNESS_BAND, ROUNDOFF, load3, max3, min3};
 
 /// What the kernels know of one triangle. 60 bytes.
 #[derive(Clone, Copy, Debug)]
@@ -124,6 +124,10 @@ impl EdgeLanes {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Origin {
     /// One point for all, evaluated up to `reach` away from it on either axis.
+    #[allow(
+        dead_code,
+        reason = "batches with a common origin count from here; not every kernel has such"
+    )]
     Point { x: f32, y: f32, reach: f32 },
     /// Each triangle's own corner 0.
     OwnCorner,
@@ -137,20 +141,55 @@ const MARGIN: f32 = 4.0;
 #[inline(always)]
 pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, rounding: f32, out: &mut EdgeLanes) {
     let splat = |value: f32| f32x16::splat(simd, value);
-    let load = |lanes: &[f32; LANES]| f32x16::from_slice(simd, lanes);
-    let x = [load(&v.x[0]), load(&v.x[1]), load(&v.x[2])];
-    let y = [load(&v.y[0]), load(&v.y[1]), load(&v.y[2])];
-    let n = [load(&v.nearness[0]), load(&v.nearness[1]), load(&v.nearness[2])];
-    let (x_min, x_max) = (x[0].min(x[1]).min(x[2]), x[0].max(x[1]).max(x[2]));
-    let (y_min, y_max) = (y[0].min(y[1]).min(y[2]), y[0].max(y[1]).max(y[2]));
-    let (w, h) = (x_max - x_min, y_max - y_min);
-    let largest = x_min.abs().max(x_max.abs()).max(y_min.abs().max(y_max.abs()));
-    // Half an ulp of the largest coordinate: vertices, and raster points that were projected themselves.
-    let eps = largest * splat(1.05 * ROUNDOFF) + splat(rounding);
-    let (ox, oy, reach) = match origin {
-        Origin::Point { x, y, reach } => (splat(x), splat(y), splat(reach)),
-        Origin::OwnCorner => (x[0], y[0], splat(MARGIN)),
+    let (x, y, nearness) = (load3(simd, &v.x), load3(simd, &v.y), load3(simd, &v.nearness));
+    let origin = match origin {
+        Origin::Point { x, y, reach } => LaneOrigin {
+            x: splat(x),
+            y: splat(y),
+            reach: [splat(reach); 2],
+        },
+        Origin::OwnCorner => LaneOrigin {
+            x: x[0],
+            y: y[0],
+            reach: [splat(MARGIN); 2],
+        },
     };
+    // Half an ulp of the largest coordinate: vertices, and raster points that were projected themselves.
+    let eps = largest(x, y) * splat(1.05 * ROUNDOFF) + splat(rounding);
+    set_up_lanes(simd, [x, y, nearness], &origin, eps, out);
+}
+
+/// Largest magnitude of a coordinate.
+#[inline(always)]
+pub(crate) fn largest<S: Simd>(x: [f32x16<S>; 3], y: [f32x16<S>; 3]) -> f32x16<S> {
+    max3([x[0].abs(), x[1].abs(), x[2].abs()]).max(max3([y[0].abs(), y[1].abs(), y[2].abs()]))
+}
+
+/// Where each lane's raster points are counted from, and how far they lie from there at most on either axis.
+pub(crate) struct LaneOrigin<S: Simd> {
+    pub(crate) x: f32x16<S>,
+    pub(crate) y: f32x16<S>,
+    pub(crate) reach: [f32x16<S>; 2],
+}
+
+/// As [`set_up`], from x, y and nearness of the three corners; `eps` bounds the error of a coordinate.
+///
+/// Nearness inside of the triangle: an interpolant is off by no more than its values and corners are, so the
+/// rounding of corners costs their error times the slope, however thin the triangle. The rest is the rounding of the
+/// slopes themselves.
+#[inline(always)]
+pub(crate) fn set_up_lanes<S: Simd>(
+    simd: S,
+    [x, y, n]: [[f32x16<S>; 3]; 3],
+    origin: &LaneOrigin<S>,
+    eps: f32x16<S>,
+    out: &mut EdgeLanes,
+) {
+    let splat = |value: f32| f32x16::splat(simd, value);
+    let (x_min, x_max) = (min3(x), max3(x));
+    let (y_min, y_max) = (min3(y), max3(y));
+    let (w, h) = (x_max - x_min, y_max - y_min);
+    let LaneOrigin { x: ox, y: oy, reach } = *origin;
 
     let (x01, y01) = (x[1] - x[0], y[1] - y[0]);
     let (x02, y02) = (x[2] - x[0], y[2] - y[0]);
@@ -160,12 +199,12 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, rounding
 
     // How far, at most, an evaluated point lies from any vertex, and how far the origin from either.
     let (near_x, near_y) = (w + splat(MARGIN), h + splat(MARGIN));
-    let (far_x, far_y) = (w + reach, h + reach);
+    let (far_x, far_y) = (w + reach[0], h + reach[1]);
     for (i, j, k) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
         let (ex, ey) = (x[k] - x[j], y[k] - y[j]);
         let (ax, ay) = (ex.abs(), ey.abs());
         let bound = eps * splat(2.0) * (near_x + near_y + ax + ay)
-            + splat(12.0 * ROUNDOFF) * (ax * far_y + ay * far_x);
+            + splat(14.0 * ROUNDOFF) * (ax * far_y + ay * far_x);
         let scale = orientation / (bound * splat(1.02) + splat(f32::MIN_POSITIVE));
         let constant = ex * (oy - y[j]) - ey * (ox - x[j]);
         (-ey * scale).store_slice(&mut out.a[i]);
@@ -181,18 +220,14 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, rounding
     gy.store_slice(&mut out.nearness_y);
     (n[0] + gx * (ox - x[0]) + gy * (oy - y[0])).store_slice(&mut out.nearness);
 
-    // Error of n inside the triangle: of the differences, of the area, of the raster point, of the evaluation.
-    let n_min = n[0].min(n[1]).min(n[2]);
-    let n_max = n[0].max(n[1]).max(n[2]);
+    let (n_min, n_max) = (min3(n), max3(n));
     let shift = (gx.abs() + gy.abs()) * eps * splat(2.0);
     let spread = n01.abs().max(n02.abs());
-    let inverse = inverse.abs();
-    let differences = inverse
-        * (w * h * splat(4.0 * ROUNDOFF) * (n_max * splat(2.0) + spread * splat(4.0))
-            + eps * spread * splat(4.0) * (w + h));
-    let evaluation = splat(6.0 * ROUNDOFF) * (n_max + gx.abs() * far_x + gy.abs() * far_y);
-    // The area divides both slopes alike, so its error scales n(q) - n0 as a whole.
-    let error = differences + spread * inverse * area_error + shift + evaluation;
+    // Of the products; the area divides both slopes alike, so its error scales n(q) - n0 as a whole.
+    let slopes = spread * inverse.abs() * w * h * splat(32.0 * ROUNDOFF);
+    let evaluation =
+        splat(ROUNDOFF) * (n_max * splat(12.0) + (gx.abs() * far_x + gy.abs() * far_y) * splat(8.0));
+    let error = shift + slopes + evaluation;
 
     let good = area.abs().simd_gt(area_error * splat(2.0))
         & error.simd_lt(n_min * splat(NEARNESS_BAND * 0.25))

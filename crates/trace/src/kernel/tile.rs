@@ -1,40 +1,73 @@
-//! Triangles against the rays of one tile, in object order (HM08 §5.1), sixteen rays at a time.
+//! A tile's visibility buffer, and one triangle drawn into it (HM08 §5.1), sixteen rays at a time.
 //!
-//! A tile is kept in blocks of 4 x 4 pixels: block (bx, by) holds lanes `(by * stride + bx) * 16 ..`, pixel
-//! (x, y) of the block in lane `y * 4 + x`. Each pixel has the nearness of its closest triangle so far and that
-//! triangle's id: a visibility buffer, 8 bytes a pixel. Rays are never stored; they follow from the raster.
+//! Sixteen is also how a tile is divided: a patch is 4 x 4 blocks, a block is 4 x 4 pixels. Each pixel has the
+//! nearness of its closest triangle so far and that triangle's id, 8 bytes; each block has the smallest nearness of
+//! its pixels, which hides what is farther before its edges are evaluated. One vector holds a block's pixels, or
+//! what is to be known of a patch's blocks. Rays are never stored; they follow from the raster. Pixels beyond the
+//! raster are as near as can be, so nothing is ever drawn there.
 //!
-//! Cost: per triangle and block about 20 vector instructions.
+//! Cost: about 25 vector instructions for a triangle and a patch, and 20 for each block that is not decided with
+//! its patch.
 
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
 
-use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
-use super::{LANES, NEARNESS_BAND, SimdLevel};
+use super::edges::EdgeRecord;
+use super::{LANES, NEARNESS_BAND, SimdLevel, bits_of, linear, linear3, min3, splat3};
 
-/// Side of a block in pixels.
+/// Side of a block in pixels, and of a patch in blocks.
 pub(crate) const BLOCK: u32 = 4;
+
+/// Side of a patch in pixels.
+pub(crate) const PATCH: u32 = BLOCK * BLOCK;
 
 /// Id of "no triangle".
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// Nearness and triangle of every pixel of a tile, block by block.
+/// What the pixels of a block of 4 x 4 see; pixel (x, y) of the block is at `y * 4 + x`.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub struct BlockPixels {
+    /// Nearness of the triangle seen, a few units of 1e-5 of itself off; of no meaning where none is.
+    pub nearness: [f32; LANES],
+    /// The triangle seen, or [`Self::NONE`].
+    pub prim: [u32; LANES],
+}
+
+impl BlockPixels {
+    /// Stands for "no triangle".
+    pub const NONE: u32 = NONE;
+
+    const EMPTY: Self = Self {
+        nearness: [0.0; LANES],
+        prim: [NONE; LANES],
+    };
+}
+
+/// Nearness and triangle of every pixel of a tile. Patches lie in rows; a patch's blocks lie together.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TileBuffer {
-    pub(crate) nearness: Vec<[f32; LANES]>,
-    pub(crate) prim: Vec<[u32; LANES]>,
-    /// Blocks in a row.
+    pub(crate) blocks: Vec<BlockPixels>,
+    /// Of every block the smallest nearness of its pixels, or less.
+    pub(crate) farthest: Vec<f32>,
+    /// Blocks of which `farthest` may have become too small.
+    stale: Vec<u32>,
+    size: [u32; 2],
+    /// Patches in a row.
     pub(crate) stride: u32,
     /// Pixels whose answer f32 could not tell, to be settled exactly.
     pub(crate) unsure: Vec<Unsure>,
 }
 
-/// A pixel, the triangle that may be its closest, and an upper bound of that triangle's nearness there.
+/// A pixel and the triangle that may be its closest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unsure {
     pub(crate) block: u32,
     pub(crate) lane: u32,
     pub(crate) prim: u32,
-    pub(crate) at_most: f32,
+    /// Nearness of the triangle there; infinite where it is not known.
+    pub(crate) nearness: f32,
+    /// Whether the triangle certainly covers the pixel.
+    pub(crate) covers: bool,
 }
 
 /// Inclusive range of blocks.
@@ -45,175 +78,341 @@ pub(crate) struct BlockRect {
 }
 
 impl TileBuffer {
-    /// Empties the tile and gives it `blocks` columns and rows of blocks.
-    pub(crate) fn clear(&mut self, blocks: [u32; 2]) {
-        let count = (blocks[0] * blocks[1]) as usize;
-        self.stride = blocks[0];
-        self.nearness.clear();
-        self.nearness.resize(count, [0.0; LANES]);
-        self.prim.clear();
-        self.prim.resize(count, [NONE; LANES]);
+    /// Empties the tile and gives it a size in pixels.
+    pub(crate) fn clear(&mut self, [width, height]: [u32; 2]) {
+        let patches = [width.div_ceil(PATCH), height.div_ceil(PATCH)];
+        let count = patches[0] as usize * patches[1] as usize * LANES;
+        self.stride = patches[0];
+        self.size = [width, height];
+        self.stale.clear();
+        self.blocks.clear();
+        self.blocks.resize(count, BlockPixels::EMPTY);
+        self.farthest.clear();
+        self.farthest.resize(count, 0.0);
         self.unsure.clear();
+        if width % PATCH != 0 || height % PATCH != 0 {
+            self.shut(patches.map(|n| n * PATCH), [width, height]);
+        }
+    }
+
+    /// Puts the pixels beyond the raster before everything.
+    fn shut(&mut self, padded: [u32; 2], size: [u32; 2]) {
+        for (x, y) in (0..padded[1]).flat_map(|y| (0..padded[0]).map(move |x| (x, y))) {
+            if x >= size[0] || y >= size[1] {
+                let (block, lane) = self.place(x, y);
+                self.blocks[block].nearness[lane] = f32::INFINITY;
+            }
+        }
+        for (farthest, block) in self.farthest.iter_mut().zip(&self.blocks) {
+            *farthest = block.nearness.into_iter().fold(f32::INFINITY, f32::min);
+        }
+    }
+
+    /// Block of a pixel, and the pixel's place in it.
+    #[inline]
+    pub(crate) fn place(&self, x: u32, y: u32) -> (usize, usize) {
+        let block = self.block(x / BLOCK, y / BLOCK);
+        (block, (y % BLOCK * BLOCK + x % BLOCK) as usize)
+    }
+
+    /// Index of the block at these block coordinates.
+    #[inline(always)]
+    pub(crate) fn block(&self, x: u32, y: u32) -> usize {
+        let patch = y / BLOCK * self.stride + x / BLOCK;
+        (patch * PATCH + y % BLOCK * BLOCK + x % BLOCK) as usize
+    }
+
+    /// Of the 4 x 4 pixels from (x, y), a bit for those of the tile.
+    #[inline(always)]
+    pub(super) fn within(&self, x: u32, y: u32) -> u32 {
+        let left = |start: u32, size: u32| (size - 1 - start).min(BLOCK - 1);
+        square(left(x, self.size[0]), left(y, self.size[1]))
+    }
+
+    /// Takes a triangle into one pixel, which it may cover, or does.
+    #[inline(always)]
+    pub(super) fn merge_pixel(&mut self, [x, y]: [u32; 2], nearness: f32, prim: u32, covers: bool) {
+        let (block, lane) = self.place(x, y);
+        let pixels = &mut self.blocks[block];
+        let stored = pixels.nearness[lane];
+        if nearness * (1.0 + NEARNESS_BAND) < stored {
+            return;
+        }
+        if covers && nearness * (1.0 - NEARNESS_BAND) > stored {
+            pixels.nearness[lane] = nearness;
+            pixels.prim[lane] = prim;
+            if self.stale.last() != Some(&(block as u32)) {
+                self.stale.push(block as u32);
+            }
+        } else {
+            self.unsure.push(Unsure {
+                block: block as u32,
+                lane: lane as u32,
+                prim,
+                nearness,
+                covers,
+            });
+        }
+    }
+
+    /// Finds anew the smallest nearness of blocks that changed pixel by pixel.
+    #[inline(always)]
+    pub(super) fn refresh<S: Simd>(&mut self, simd: S) {
+        for block in self.stale.drain(..) {
+            let pixels = &self.blocks[block as usize].nearness;
+            self.farthest[block as usize] = f32x16::from_slice(simd, pixels).reduce_min();
+        }
+    }
+
+    /// Pixel of a lane of a block.
+    pub(crate) fn pixel(&self, block: u32, lane: u32) -> [u32; 2] {
+        let (patch, block) = (block / PATCH, block % PATCH);
+        let x = (patch % self.stride * BLOCK + block % BLOCK) * BLOCK + lane % BLOCK;
+        let y = (patch / self.stride * BLOCK + block / BLOCK) * BLOCK + lane / BLOCK;
+        [x, y]
     }
 }
 
-/// Where a tile lies.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct TilePlace {
-    /// Raster point of its corner.
-    pub(crate) origin: [u32; 2],
-    /// Columns and rows of blocks.
-    pub(crate) blocks: [u32; 2],
-    /// See [`crate::view::View::rounding`].
-    pub(crate) rounding: f32,
+/// Whether all pixels of these blocks have something nearer than `nearest`.
+#[inline(always)]
+pub(super) fn hides<S: Simd>(simd: S, tile: &TileBuffer, rect: BlockRect, nearest: f32) -> bool {
+    let nearest = f32x16::splat(simd, nearest);
+    for py in rect.y[0] / BLOCK..=rect.y[1] / BLOCK {
+        for px in rect.x[0] / BLOCK..=rect.x[1] / BLOCK {
+            let first = ((py * tile.stride + px) * PATCH) as usize;
+            let farthest = f32x16::from_slice(simd, &tile.farthest[first..first + LANES]);
+            if bits_of(simd, !farthest.simd_gt(nearest)) & blocks_within(rect, px, py) != 0 {
+                return false;
+            }
+        }
+    }
+    true
 }
 
-/// Draws up to sixteen projected triangles; returns a bit for every lane that could not be set up.
-pub(crate) fn draw_batch(
+/// Draws one triangle that `record` sets up in f64, unless `nearest` says that it is hidden.
+pub(crate) fn draw_precise(
     level: SimdLevel,
     tile: &mut TileBuffer,
-    vertices: &VertexLanes,
-    edges: &mut EdgeLanes,
-    place: &TilePlace,
-) -> u32 {
-    dispatch!(level.0, simd => draw_batch_impl(simd, tile, vertices, edges, place))
+    rect: BlockRect,
+    nearest: f32,
+    record: impl FnOnce() -> Option<EdgeRecord>,
+) {
+    if dispatch!(level.0, simd => hides(simd, tile, rect, nearest)) {
+        return;
+    }
+    if let Some(record) = record() {
+        dispatch!(level.0, simd => draw::<_, true>(simd, tile, &record, rect, f32::INFINITY));
+    }
 }
 
+/// Offsets of a block's pixel centres from its corner.
 #[inline(always)]
-fn draw_batch_impl<S: Simd>(
+pub(super) fn pixel_lanes<S: Simd>(simd: S) -> [f32x16<S>; 2] {
+    [
+        f32x16::from_fn(simd, |i| (i % BLOCK as usize) as f32 + 0.5),
+        f32x16::from_fn(simd, |i| (i / BLOCK as usize) as f32 + 0.5),
+    ]
+}
+
+/// Draws a triangle into the blocks of `rect` that it may reach; its record counts from the corner of the
+/// rectangle's first block. `nearest` bounds its nearness, widened by the
+/// band. `PRECISE` records may be vague, others are known where they cover.
+#[inline(always)]
+pub(super) fn draw<S: Simd, const PRECISE: bool>(
     simd: S,
     tile: &mut TileBuffer,
-    vertices: &VertexLanes,
-    edges: &mut EdgeLanes,
-    place: &TilePlace,
-) -> u32 {
-    let TilePlace {
-        origin,
-        blocks,
-        rounding,
-    } = *place;
-    let [ox, oy] = origin.map(|v| v as f32);
-    let reach = (blocks[0].max(blocks[1]) * BLOCK) as f32;
-    set_up(
-        simd,
-        vertices,
-        Origin::Point { x: ox, y: oy, reach },
-        rounding,
-        edges,
-    );
-    let lanes = u32::MAX >> (32 - vertices.count as u32);
-    let mut good = edges.good & lanes;
-    let bad = lanes & !good;
-    while good != 0 {
-        let lane = good.trailing_zeros() as usize;
-        good &= good - 1;
-        let rect = vertices.rect_of_lane(lane, [ox, oy], blocks);
-        let record = edges.record(lane, vertices.prim[lane]);
-        draw_impl(simd, tile, &record, rect);
-    }
-    bad
-}
-
-impl VertexLanes {
-    /// Blocks of a tile that a triangle's rectangle touches; `None` if a vertex does not lie in front.
-    pub(crate) fn block_rect(&self, lane: usize, origin: [u32; 2], blocks: [u32; 2]) -> Option<BlockRect> {
-        let ahead = self.nearness.iter().all(|n| n[lane] >= 0.0);
-        ahead.then(|| self.rect_of_lane(lane, origin.map(|v| v as f32), blocks))
-    }
-
-    #[inline(always)]
-    fn rect_of_lane(&self, lane: usize, origin: [f32; 2], blocks: [u32; 2]) -> BlockRect {
-        let pick = |v: &[[f32; LANES]; 3]| [v[0][lane], v[1][lane], v[2][lane]];
-        BlockRect {
-            x: block_range(pick(&self.x), origin[0], blocks[0]),
-            y: block_range(pick(&self.y), origin[1], blocks[1]),
-        }
-    }
-}
-
-/// Blocks whose pixel centres lie between the smallest and the largest of `v`, a little widened.
-#[inline(always)]
-fn block_range(v: [f32; 3], origin: f32, blocks: u32) -> [u32; 2] {
-    // Pixel centres lie at half units; 1/64 is far above the rounding of a coordinate below the guard.
-    let low = v[0].min(v[1]).min(v[2]) - origin - 0.5 - 1.0 / 64.0;
-    let high = v[0].max(v[1]).max(v[2]) - origin - 0.5 + 1.0 / 64.0;
-    let last = (blocks * BLOCK - 1) as f32;
-    let first = low.max(0.0).ceil().min(last) as u32;
-    let end = high.clamp(0.0, last) as u32;
-    [first / BLOCK, end / BLOCK]
-}
-
-/// Draws one triangle that was set up elsewhere.
-pub(crate) fn draw(level: SimdLevel, tile: &mut TileBuffer, record: &EdgeRecord, rect: BlockRect) {
-    dispatch!(level.0, simd => draw_impl(simd, tile, record, rect));
-}
-
-#[inline(always)]
-fn draw_impl<S: Simd>(simd: S, tile: &mut TileBuffer, record: &EdgeRecord, rect: BlockRect) {
+    record: &EdgeRecord,
+    rect: BlockRect,
+    nearest: f32,
+) {
     let splat = |v: f32| f32x16::splat(simd, v);
-    let lane_x = f32x16::from_fn(simd, |i| (i % BLOCK as usize) as f32 + 0.5);
-    let lane_y = f32x16::from_fn(simd, |i| (i / BLOCK as usize) as f32 + 0.5);
-    let base = |a: f32, b: f32, c: f32| splat(a).mul_add(lane_x, splat(b).mul_add(lane_y, splat(c)));
-    let EdgeRecord { a, b, c, .. } = *record;
-    let base_edges = [
-        base(a[0], b[0], c[0]),
-        base(a[1], b[1], c[1]),
-        base(a[2], b[2], c[2]),
-    ];
-    let base_nearness = base(record.nearness_x, record.nearness_y, record.nearness);
-    let (nearer, farther) = (splat(1.0 - NEARNESS_BAND), splat(1.0 + NEARNESS_BAND));
+    let [pixel_x, pixel_y] = pixel_lanes(simd);
+    let half = splat(0.5);
+    let side = splat(BLOCK as f32);
+    let (block_x, block_y) = ((pixel_x - half) * side, (pixel_y - half) * side);
+    let (a, b, c) = (
+        splat3(simd, record.a),
+        splat3(simd, record.b),
+        splat3(simd, record.c),
+    );
+    let plane = splat3(simd, [record.nearness_x, record.nearness_y, record.nearness]);
+    let [most0, least0] = range_in_block(simd, a[0], b[0]);
+    let [most1, least1] = range_in_block(simd, a[1], b[1]);
+    let [most2, least2] = range_in_block(simd, a[2], b[2]);
+    let [rise, fall] = range_in_block(simd, plane[0], plane[1]);
+    let farther = splat(1.0 + NEARNESS_BAND);
+    let mut corners = [[0.0f32; LANES]; 4];
 
-    for by in rect.y[0]..=rect.y[1] {
-        let y = (by * BLOCK) as f32;
-        let row = (by * tile.stride) as usize;
-        for bx in rect.x[0]..=rect.x[1] {
-            let x = (bx * BLOCK) as f32;
-            let g = |i: usize| base_edges[i] + splat(a[i] * x + b[i] * y);
-            let inside = g(0).min(g(1)).min(g(2));
-            let covered = inside.simd_ge(splat(-1.0));
-            if covered.all_false() {
+    let start = [(rect.x[0] * BLOCK) as f32, (rect.y[0] * BLOCK) as f32];
+
+    for py in rect.y[0] / BLOCK..=rect.y[1] / BLOCK {
+        let y = block_y + splat((py * PATCH) as f32 - start[1]);
+        for px in rect.x[0] / BLOCK..=rect.x[1] / BLOCK {
+            let x = block_x + splat((px * PATCH) as f32 - start[0]);
+            let edges = linear3(a, b, c, [x, y]);
+            let nearness = linear(plane[0], plane[1], plane[2], [x, y]);
+            let any = min3([edges[0] + most0, edges[1] + most1, edges[2] + most2]);
+            let all = min3([edges[0] + least0, edges[1] + least1, edges[2] + least2]);
+            let first = ((py * tile.stride + px) * PATCH) as usize;
+            let mut reached = any.simd_ge(splat(-1.0));
+            let farthest = f32x16::from_slice(simd, &tile.farthest[first..first + LANES]);
+            let bound = ((nearness + rise) * farther).min(splat(nearest));
+            let mut open = bound.simd_ge(farthest);
+            if PRECISE {
+                let known = (nearness + fall).simd_ge(splat(record.floor))
+                    & (nearness + rise).simd_le(splat(record.ceiling));
+                open |= !known;
+            }
+            reached &= open;
+            let mut reached = bits_of(simd, reached) & blocks_within(rect, px, py);
+            if reached == 0 {
                 continue;
             }
-            let block = row + bx as usize;
-            let nearness = base_nearness + splat(record.nearness_x * x + record.nearness_y * y);
-            let stored = f32x16::from_slice(simd, &tile.nearness[block]);
-            // A plane outside of its range, or of unknown range, is not known well enough to be called hidden.
-            let vague = !(nearness.simd_ge(splat(record.floor)) & nearness.simd_le(splat(record.ceiling)));
-            let possible = covered & ((nearness * farther).simd_ge(stored) | vague);
-            if possible.all_false() {
-                continue;
-            }
-            let sure = inside.simd_gt(splat(1.0)) & (nearness * nearer).simd_gt(stored) & !vague & possible;
-            let unsure = (possible & !sure).to_bitmask() as u32;
-            sure.select(nearness, stored)
-                .store_slice(&mut tile.nearness[block]);
-            let prim = u32x16::from_slice(simd, &tile.prim[block]);
-            sure.select(u32x16::splat(simd, record.prim), prim)
-                .store_slice(&mut tile.prim[block]);
-            if unsure != 0 {
-                let at_most = vague.select(splat(f32::INFINITY), nearness * farther);
-                note_unsure(
-                    &mut tile.unsure,
-                    block as u32,
-                    unsure,
-                    record.prim,
-                    at_most.into(),
-                );
+            let accepted = bits_of(simd, all.simd_gt(splat(1.0)));
+            edges[0].store_slice(&mut corners[0]);
+            edges[1].store_slice(&mut corners[1]);
+            edges[2].store_slice(&mut corners[2]);
+            nearness.store_slice(&mut corners[3]);
+            while reached != 0 {
+                let lane = reached.trailing_zeros() as usize;
+                reached &= reached - 1;
+                let pixel = [pixel_x, pixel_y];
+                let nearness = linear(plane[0], plane[1], splat(corners[3][lane]), pixel);
+                if accepted & (1 << lane) != 0 {
+                    merge::<S, true, PRECISE>(simd, tile, first + lane, nearness, nearness, record);
+                } else {
+                    let corner = [corners[0][lane], corners[1][lane], corners[2][lane]];
+                    let inside = min3(linear3(a, b, splat3(simd, corner), pixel));
+                    merge::<S, false, PRECISE>(simd, tile, first + lane, inside, nearness, record);
+                }
             }
         }
+    }
+}
+
+/// What a linear function rises at most and at least from a block's corner to its pixel centres: one of the outermost
+/// has the extreme.
+#[inline(always)]
+pub(super) fn range_in_block<S: Simd>(simd: S, a: f32x16<S>, b: f32x16<S>) -> [f32x16<S>; 2] {
+    let (first, last) = (f32x16::splat(simd, 0.5), f32x16::splat(simd, BLOCK as f32 - 0.5));
+    let (ax, bx, ay, by) = (a * first, a * last, b * first, b * last);
+    [ax.max(bx) + ay.max(by), ax.min(bx) + ay.min(by)]
+}
+
+/// Edge functions' least, and nearness, at points relative to a record's.
+#[inline(always)]
+pub(super) fn evaluate<S: Simd>(simd: S, record: &EdgeRecord, at: [f32x16<S>; 2]) -> [f32x16<S>; 2] {
+    let (a, b, c) = (
+        splat3(simd, record.a),
+        splat3(simd, record.b),
+        splat3(simd, record.c),
+    );
+    let plane = splat3(simd, [record.nearness_x, record.nearness_y, record.nearness]);
+    [
+        min3(linear3(a, b, c, at)),
+        linear(plane[0], plane[1], plane[2], at),
+    ]
+}
+
+/// Of 4 x 4 places in rows of four a bit for those in columns 0 to `x` and rows 0 to `y`, both at most 3.
+#[inline(always)]
+pub(super) fn square(x: u32, y: u32) -> u32 {
+    let (columns, rows) = ((2 << x) - 1, (0x10 << (4 * y)) - 1);
+    (columns * 0x1111) & rows
+}
+
+/// A bit for every block of patch (px, py) that lies in `rect`.
+#[inline(always)]
+fn blocks_within(rect: BlockRect, px: u32, py: u32) -> u32 {
+    let range = |[first, last]: [u32; 2], patch: u32| {
+        let start = patch * BLOCK;
+        let (first, last) = (first.max(start) - start, (last - start).min(BLOCK - 1));
+        (2 << last) - (1u32 << first)
+    };
+    let (columns, rows) = (range(rect.x, px), range(rect.y, py));
+    // Bit i of the rows moves to bit 4 i, then every row takes the columns.
+    let rows = (rows & 1) | (rows & 2) << 3 | (rows & 4) << 6 | (rows & 8) << 9;
+    rows * columns
+}
+
+/// Draws without looking at more than one block at a time, as HM08 does.
+#[inline(always)]
+pub(super) fn draw_flat<S: Simd>(simd: S, tile: &mut TileBuffer, record: &EdgeRecord, rect: BlockRect) {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let [pixel_x, pixel_y] = pixel_lanes(simd);
+    for by in rect.y[0]..=rect.y[1] {
+        let y = pixel_y + splat(((by - rect.y[0]) * BLOCK) as f32);
+        for bx in rect.x[0]..=rect.x[1] {
+            let x = pixel_x + splat(((bx - rect.x[0]) * BLOCK) as f32);
+            let [inside, nearness] = evaluate(simd, record, [x, y]);
+            let block = tile.block(bx, by);
+            merge::<S, false, false>(simd, tile, block, inside, nearness, record);
+        }
+    }
+}
+
+/// Takes a triangle into the pixels of a block: `inside` is the least of its edge functions, not looked at if the
+/// triangle covers the whole block.
+#[inline(always)]
+pub(super) fn merge<S: Simd, const ALL: bool, const PRECISE: bool>(
+    simd: S,
+    tile: &mut TileBuffer,
+    block: usize,
+    inside: f32x16<S>,
+    nearness: f32x16<S>,
+    record: &EdgeRecord,
+) {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let pixels = &mut tile.blocks[block];
+    let stored = f32x16::from_slice(simd, &pixels.nearness);
+    let mut possible = (nearness * splat(1.0 + NEARNESS_BAND)).simd_ge(stored);
+    let mut sure = (nearness * splat(1.0 - NEARNESS_BAND)).simd_gt(stored);
+    let mut known = nearness;
+    if PRECISE {
+        // A plane outside of its range, or of unknown range, is not known well enough to be called hidden.
+        let vague = !(nearness.simd_ge(splat(record.floor)) & nearness.simd_le(splat(record.ceiling)));
+        possible |= vague & stored.simd_lt(splat(f32::INFINITY));
+        sure &= !vague;
+        known = vague.select(splat(f32::INFINITY), nearness);
+    }
+    let covers = inside.simd_gt(splat(1.0));
+    if !ALL {
+        possible &= inside.simd_ge(splat(-1.0));
+        sure &= covers;
+    }
+    if possible.all_false() {
+        return;
+    }
+    let merged = sure.select(nearness, stored);
+    merged.store_slice(&mut pixels.nearness);
+    let prim = u32x16::from_slice(simd, &pixels.prim);
+    sure.select(u32x16::splat(simd, record.prim), prim)
+        .store_slice(&mut pixels.prim);
+    tile.farthest[block] = merged.reduce_min();
+    let unsure = bits_of(simd, possible & !sure);
+    if unsure != 0 {
+        let covers = if ALL { u32::MAX } else { bits_of(simd, covers) };
+        note_unsure(tile, block as u32, [unsure, covers], record.prim, known.into());
     }
 }
 
 #[cold]
-fn note_unsure(list: &mut Vec<Unsure>, block: u32, mut lanes: u32, prim: u32, at_most: [f32; LANES]) {
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros();
-        lanes &= lanes - 1;
-        list.push(Unsure {
+fn note_unsure(
+    tile: &mut TileBuffer,
+    block: u32,
+    [mut unsure, covers]: [u32; 2],
+    prim: u32,
+    nearness: [f32; LANES],
+) {
+    while unsure != 0 {
+        let lane = unsure.trailing_zeros();
+        unsure &= unsure - 1;
+        tile.unsure.push(Unsure {
             block,
             lane,
             prim,
-            at_most: at_most[lane as usize],
+            nearness: nearness[lane as usize],
+            covers: covers & (1 << lane) != 0,
         });
     }
 }
