@@ -1,7 +1,8 @@
 //! Visibility of whole frames at 1920 x 1200 on one thread, every structure rebuilt for every frame.
 //!
-//! `eye`: grid built, closest triangle of every pixel found. `eye_and_hard_shadows`: the same, then one light's
-//! grid built and one shadow ray traced from every pixel that sees a surface. No shading. Items are rays.
+//! `eye`: grid built, closest triangle of every pixel found. `eye_and_hard_shadows`: the same, then every pixel told
+//! whether one light reaches it. `eye_and_looked_up_shadows`: the same by HM08's own way, the light's grid built and
+//! one shadow ray looked up from every pixel that sees a surface. No shading. Items are pixels and shadow rays.
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` (a folder with `cameras.json`) where it is set. Run
 //! as a test (`cargo test --benches`) the raster is small.
@@ -14,8 +15,8 @@ use divan::counter::ItemsCount;
 use rayward::CameraFrame;
 use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
-    Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver,
-    ShadowScratch, SimdLevel, TileHits, Triangles, View, exact,
+    Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions, LightQuery, LitPixels, PointLightGrid,
+    Receiver, ShadowScratch, SimdLevel, TileHits, Triangles, View, Visibility, exact,
 };
 
 fn main() {
@@ -171,13 +172,43 @@ fn eye(bencher: Bencher, name: &str) {
     });
 }
 
+/// Where shadow rays end.
+fn light_of(frame: &Frame) -> Light {
+    match frame.light.kind {
+        LightKind::Directional { .. } => Light::Directional((-frame.light.direction).as_vec3()),
+        _ => Light::Point((frame.light.position - frame.geometry.origin).as_vec3()),
+    }
+}
+
 #[divan::bench(args = scenes())]
 fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
     with_frame(name, |frame| {
-        let light = match frame.light.kind {
-            LightKind::Directional { .. } => Light::Directional((-frame.light.direction).as_vec3()),
-            _ => Light::Point((frame.light.position - frame.geometry.origin).as_vec3()),
+        let (view, triangles) = (view(frame), triangles(&frame.geometry));
+        let query = LightQuery {
+            light: light_of(frame),
+            cone: None,
+            eye: Light::Point(view.center),
+            rule: &|_| Casts::Both,
         };
+        let run = || {
+            let level = SimdLevel::detect();
+            let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+            let visibility = Visibility::trace(&grid, &|| ());
+            LitPixels::find(&visibility, &triangles, &query, level)
+        };
+        let counts = run().counts;
+        if !is_test() {
+            println!("{name}: {counts:?}");
+        }
+        let rays = u64::from(view.width * view.height) + counts.receivers;
+        bencher.counter(ItemsCount::new(rays)).bench_local(run);
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_looked_up_shadows(bencher: Bencher, name: &str) {
+    with_frame(name, |frame| {
+        let light = light_of(frame);
         let (mut asked, view) = (0, view(frame));
         trace(frame, |receivers| asked += receivers.len());
         let rays = (view.width * view.height) as usize + asked;

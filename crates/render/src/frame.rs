@@ -76,7 +76,8 @@ impl<'s> Renderer<'s> {
         let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
 
         let plan = FramePlan::new(geometry, lights, options);
-        let structures = FrameStructures::build(&plan, view, geometry, clusters, &rules, options);
+        let eye = eye_of(&camera);
+        let structures = FrameStructures::build(&plan, view, geometry, clusters, &rules, eye, options);
         let build = start.elapsed();
 
         let start = Instant::now();
@@ -110,6 +111,7 @@ impl<'s> Renderer<'s> {
             })
             .reduce(TileCounts::default, TileCounts::sum);
         drop(tiles);
+        let counts = structures.counts().sum(counts);
 
         let stats = FrameStats {
             triangles: geometry.triangle_count(),

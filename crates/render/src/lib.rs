@@ -50,7 +50,7 @@ pub use options::{CasterPolicy, RenderOptions};
 pub use plan::{FramePlan, LightPlan};
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use stats::{FrameStats, StructureStats};
-pub use structures::FrameStructures;
+pub use structures::{FrameStructures, LightShadows};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};
 
 pub use rayward_scene as scene;

@@ -3,10 +3,11 @@
 use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
-use rayward_trace::{Bvh, Clusters, EyeGrid, PointLightGrid, View};
+use rayward_trace::{Bvh, Clusters, EyeGrid, Light, LightQuery, LitPixels, PointLightGrid, Tile, View, Visibility};
 
 use crate::casters::{CasterRules, triangles};
 use crate::plan::FramePlan;
+use crate::tile::TileCounts;
 use crate::{RenderOptions, StructureStats};
 
 /// All structures of one frame.
@@ -14,22 +15,37 @@ use crate::{RenderOptions, StructureStats};
 pub struct FrameStructures<'g> {
     /// The camera's grid.
     pub eye: EyeGrid<'g>,
+    /// What the camera sees, if the lights were asked for all of it at once.
+    pub visibility: Option<Visibility>,
     /// One entry a light, as in the plan.
-    pub lights: Vec<Option<PointLightGrid<'g>>>,
+    pub lights: Vec<LightShadows<'g>>,
     /// A hierarchy of all triangles, for rays that pass through masked and blended ones; `None` without such.
     pub layers: Option<Bvh<'g>>,
     /// What each structure cost.
     pub stats: Vec<StructureStats>,
 }
 
+/// How the shadows of a light are found.
+#[derive(Debug)]
+pub enum LightShadows<'g> {
+    /// It casts none.
+    Nothing,
+    /// Point by point in its grid.
+    Grid(PointLightGrid<'g>),
+    /// For all pixels at once, before they are shaded.
+    Pixels(LitPixels),
+}
+
 impl<'g> FrameStructures<'g> {
-    /// Builds all structures; each build uses all threads.
+    /// Builds all structures; each build uses all threads. Where every pixel shows one surface, lights are done one after
+    /// the other, so that memory does not grow with their number but for a bit a pixel.
     pub fn build(
         plan: &FramePlan,
         view: View,
         geometry: &'g FrameGeometry,
         clusters: &'g Clusters,
         rules: &CasterRules,
+        eye_point: Light,
         options: &RenderOptions,
     ) -> Self {
         let triangles = triangles(geometry);
@@ -49,28 +65,54 @@ impl<'g> FrameStructures<'g> {
             references: eye.reference_count(),
         });
 
+        // Layers behind each other are receivers of their own, and the paper looks each ray up.
+        let at_once = plan.lights.iter().any(Option::is_some) && !rules.any_transparent() && !options.paper;
+        let visibility = at_once.then(|| {
+            let start = Instant::now();
+            let visibility = Visibility::trace(&eye, &|| ());
+            stats.push(StructureStats {
+                name: "visibility".into(),
+                build: start.elapsed(),
+                bytes: visibility.bytes(),
+                cells: 0,
+                references: 0,
+            });
+            visibility
+        });
+
         let mut lights = Vec::with_capacity(plan.lights.len());
         for (i, plan) in plan.lights.iter().enumerate() {
             let Some(plan) = plan else {
-                lights.push(None);
+                lights.push(LightShadows::Nothing);
                 continue;
             };
             let start = Instant::now();
             let rule = rules.for_light(geometry, &plan.light);
-            let grid = PointLightGrid::build(plan.light, triangles, &rule, plan.grid, options.level);
+            let query = LightQuery {
+                light: plan.light,
+                cone: plan.grid.cone,
+                eye: eye_point,
+                rule: &rule,
+            };
+            let shadows = match &visibility {
+                Some(visibility) => {
+                    LightShadows::Pixels(LitPixels::find(visibility, &triangles, &query, options.level))
+                }
+                None => LightShadows::Grid(PointLightGrid::build(
+                    plan.light,
+                    triangles,
+                    &rule,
+                    plan.grid,
+                    options.level,
+                )),
+            };
             let name = if plan.name.is_empty() {
                 i.to_string()
             } else {
                 format!("{:?}", plan.name)
             };
-            stats.push(StructureStats {
-                name: format!("light grid {name}"),
-                build: start.elapsed(),
-                bytes: grid.bytes(),
-                cells: grid.cell_count(),
-                references: grid.reference_count(),
-            });
-            lights.push(Some(grid));
+            stats.push(shadows.stats(&name, start));
+            lights.push(shadows);
         }
 
         let layers = rules.any_transparent().then(|| {
@@ -87,9 +129,58 @@ impl<'g> FrameStructures<'g> {
         });
         Self {
             eye,
+            visibility,
             lights,
             layers,
             stats,
+        }
+    }
+
+    /// What was counted before the tiles.
+    pub(crate) fn counts(&self) -> TileCounts {
+        let mut counts = TileCounts {
+            exact_pixels: self.visibility.as_ref().map_or(0, Visibility::exact_pixels),
+            ..TileCounts::default()
+        };
+        for light in &self.lights {
+            if let LightShadows::Pixels(lit) = light {
+                counts.shadow_rays += lit.counts.receivers;
+                counts.lit_by_cell += lit.counts.untested;
+            }
+        }
+        counts
+    }
+
+    /// Triangle seen by pixel (x, y) of a tile, if all tiles have been traced.
+    #[inline]
+    pub(crate) fn seen(&self, tile: &Tile, x: u32, y: u32) -> Option<Option<u32>> {
+        self.visibility.as_ref().map(|v| v.prim(tile.index, x, y))
+    }
+}
+
+impl LightShadows<'_> {
+    fn stats(&self, name: &str, start: Instant) -> StructureStats {
+        let (what, bytes, cells, references) = match self {
+            Self::Nothing => ("no shadows", 0, 0, 0),
+            Self::Grid(grid) => (
+                "light grid",
+                grid.bytes(),
+                grid.cell_count(),
+                grid.reference_count(),
+            ),
+            Self::Pixels(LitPixels { counts, .. }) => (
+                "receiver grid",
+                counts.bytes,
+                counts.light_tiles as usize,
+                counts.references as usize,
+            ),
+        };
+        StructureStats {
+            name: format!("{what} {name}"),
+            build: start.elapsed(),
+            bytes,
+            cells,
+            references,
         }
     }
 }

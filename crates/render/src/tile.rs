@@ -10,7 +10,7 @@ use rayward_trace::{Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay
 use crate::casters::triangles;
 use crate::plan::LightPlan;
 use crate::shade::{ambient, direct, object_of};
-use crate::structures::FrameStructures;
+use crate::structures::{FrameStructures, LightShadows};
 use crate::{CameraFrame, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
 
@@ -76,7 +76,10 @@ impl TileShader<'_> {
     /// Renders the tile of that index into its part of the film.
     pub(crate) fn render(&self, index: u32, work: &mut TileWork, out: &mut TileMut) -> TileCounts {
         let tile = self.structures.eye.tile(index);
-        self.structures.eye.trace_tile(&tile, &mut work.hits);
+        let traced = self.structures.visibility.is_some();
+        if !traced {
+            self.structures.eye.trace_tile(&tile, &mut work.hits);
+        }
         work.points.clear();
         work.scratch.counts = rayward_trace::ShadowCounts::default();
         for y in 0..tile.height {
@@ -86,14 +89,14 @@ impl TileShader<'_> {
             }
         }
         for light in 0..self.lights.len() {
-            self.illuminate(light, work);
+            self.illuminate(light, index, work);
         }
         for point in &work.points {
             out.color_row(point.y)[point.x as usize] += point.color * point.weight;
         }
         TileCounts {
             shadow_rays: work.scratch.counts.receivers,
-            exact_pixels: work.hits.exact_pixels as u64,
+            exact_pixels: if traced { 0 } else { work.hits.exact_pixels as u64 },
             lit_by_cell: work.scratch.counts.lit_by_cell,
         }
     }
@@ -101,7 +104,8 @@ impl TileShader<'_> {
     /// Notes the surfaces that a pixel sees; returns the pixel without their light.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
         let background = Sample::background(self.options.background);
-        let Some(prim) = work.hits.prim(x, y) else {
+        let seen = self.structures.seen(tile, x, y);
+        let Some(prim) = seen.unwrap_or_else(|| work.hits.prim(x, y)) else {
             return background;
         };
         let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
@@ -189,7 +193,16 @@ impl TileShader<'_> {
     }
 
     /// Adds the light of one source to all points of the tile that it reaches.
-    fn illuminate(&self, light: usize, work: &mut TileWork) {
+    fn illuminate(&self, light: usize, tile: u32, work: &mut TileWork) {
+        if let LightShadows::Pixels(lit) = &self.structures.lights[light] {
+            for point in &mut work.points {
+                let reached = lit.is_lit(tile, point.x, point.y);
+                if let (true, Some(incident)) = (reached, direct(&point.surface, &self.lights[light])) {
+                    point.color += incident.radiance;
+                }
+            }
+            return;
+        }
         let TileWork {
             points,
             receivers,
@@ -210,8 +223,8 @@ impl TileShader<'_> {
             }
         }
         match &self.structures.lights[light] {
-            Some(grid) => grid.shadowed(receivers, scratch, shadow),
-            None => {
+            LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
+            LightShadows::Nothing | LightShadows::Pixels(_) => {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
             }

@@ -181,6 +181,56 @@ fn an_eye_inside_of_a_closed_model() {
     }
 }
 
+/// Point lights all over the geometry.
+fn scatter_lights(geometry: &mut FrameGeometry, count: usize) {
+    let (low, high) = geometry.bounds().expect("triangles");
+    let mut light = geometry.lights[0].clone();
+    light.kind = LightKind::Point { radius: 0.0 };
+    light.power = Vec3::splat(2.0);
+    geometry.lights = (0..count)
+        .map(|i| {
+            let share = |step: f64| (i as f64 * step).fract() as f32;
+            let place = Vec3::new(share(0.618), 0.2 + 0.75 * share(0.755), share(0.570));
+            let position = geometry.origin + (low + (high - low) * place).as_dvec3();
+            PosedLight {
+                position,
+                ..light.clone()
+            }
+        })
+        .collect();
+}
+
+#[test]
+fn sixty_four_lights() {
+    check("office", 0.0, [32, 20], |geometry| scatter_lights(geometry, 64));
+}
+
+#[test]
+fn memory_does_not_grow_with_lights() {
+    let scene = builtin::build("courtyard").expect("it exists");
+    let mut geometry = scene.at(1.0);
+    scatter_lights(&mut geometry, 64);
+    let options = RenderOptions {
+        width: 480,
+        height: 300,
+        ..RenderOptions::default()
+    };
+    let camera = geometry.cameras[0].clone();
+    let lights = std::mem::take(&mut geometry.lights);
+    let frame = Renderer::new(&scene)
+        .render(&geometry, &camera, &lights, &options, &|_| ())
+        .expect("valid input");
+    let grids = frame.stats.structures.iter();
+    let bytes: Vec<usize> = grids
+        .filter(|s| s.name.starts_with("receiver grid"))
+        .map(|s| s.bytes)
+        .collect();
+    assert_eq!(bytes.len(), 64);
+    // While a light is done: 24 bytes a pixel at most, and 16 a vertex and 8 a triangle.
+    let most = 480 * 300 * 24 + geometry.x.len() * 16 + geometry.triangle_count() * 8 + (1 << 20);
+    assert!(bytes.iter().all(|&b| b > 0 && b <= most), "{bytes:?}, {most}");
+}
+
 #[test]
 fn one_and_two_threads_give_the_same_bits() {
     let scene = builtin::build("courtyard").expect("it exists");

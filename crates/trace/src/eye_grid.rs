@@ -143,6 +143,11 @@ impl TileHits {
         let prim = self.buffer.blocks[block].prim[lane];
         (prim != NONE).then_some(prim)
     }
+
+    /// Triangles seen by all pixels of the tile, block by block.
+    pub(crate) fn prims(&self) -> &[[u32; LANES]] {
+        &self.buffer.prim
+    }
 }
 
 /// Vertices projected by one task.

@@ -3,7 +3,8 @@
 //! | rays | structure | source |
 //! |---|---|---|
 //! | eye rays of one camera | [`EyeGrid`] | HM08 §5.1 |
-//! | hard shadow rays of one light | [`PointLightGrid`] | HM08 §5.2 |
+//! | hard shadow rays of one light, from all that the eye sees | [`LitPixels`] | HM08 §5.2, turned round |
+//! | hard shadow rays of one light, from any points | [`PointLightGrid`] | HM08 §5.2 |
 //! | any ray | [`Bvh`] | general hierarchy |
 //! | any ray, by definition right | [`BruteForce`] | [`exact`] |
 //!
@@ -25,12 +26,14 @@ mod light_grid;
 mod light_views;
 mod precise;
 mod ray;
+mod receiver_grid;
 pub mod space;
 #[cfg(test)]
 mod test_meshes;
 pub mod topology;
 mod triangles;
 pub mod view;
+mod visibility;
 
 pub use accel::{Accel, BuildStats, Count, Counters};
 pub use bins::Binning;
@@ -44,6 +47,8 @@ pub use light_grid::{
     CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };
 pub use ray::{Hit, Light, Ray, Receiver};
+pub use receiver_grid::{LightQuery, LitCounts, LitPixels};
 pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};
+pub use visibility::Visibility;

@@ -146,9 +146,9 @@ impl<'a> PointLightGrid<'a> {
             faces: Vec::new(),
             unprojected: Vec::new(),
         };
-        if let Some(views) = crate::light_views::views(&light, &triangles, options.cone) {
+        if let Some(faces) = crate::light_views::views(&light, &triangles, options.cone) {
             let face = |view| Face::build(view, &light, &triangles, rule, &options, level);
-            grid.faces = views.into_iter().map(face).collect();
+            grid.faces = faces.views.into_iter().map(face).collect();
         } else {
             let prims = 0..triangles.len() as u32;
             let casts = |&prim: &u32| takes_part(&light, &triangles, rule(prim), prim);
@@ -404,7 +404,7 @@ fn survey(vertices: &[RasterVertex], triangles: &Triangles) -> u32 {
 }
 
 /// Whether a triangle is put into the grid.
-fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, prim: u32) -> bool {
+pub(crate) fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, prim: u32) -> bool {
     match casts {
         Casts::Nothing => false,
         Casts::Both => true,

@@ -5,6 +5,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::kernel::pixels::LightFaces;
 use crate::light_grid::Cone;
 use crate::precise::PreciseTriangle;
 use crate::view::View;
@@ -34,13 +35,14 @@ const WIDEST_CONE: f64 = 1.5;
 
 /// The views of a light onto these triangles; none where there is nothing to see, or where the light has no
 /// finite position or direction. `None` if the geometry is too large to be projected.
-pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Option<Vec<View>> {
+pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Option<LightFaces> {
     let Some(bounds) = Bounds::of(triangles) else {
-        return Some(Vec::new());
+        return Some(LightFaces::default());
     };
     if bounds.min.abs().max(bounds.max.abs()).max_element() > LARGEST {
         return None;
     }
+    let mut cube = None;
     let views = match *light {
         Light::Directional(direction) => {
             let forward = -direction.as_dvec3();
@@ -59,18 +61,25 @@ pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) ->
             }
             None => match single_face(&bounds, position) {
                 Some(view) => vec![view],
-                None => CUBE_FACES
-                    .map(|axes| unit_view(position, axes, CUBE_FACE_TAN))
-                    .to_vec(),
+                None => {
+                    cube = Some([None; 6]);
+                    CUBE_FACES
+                        .map(|axes| unit_view(position, axes, CUBE_FACE_TAN))
+                        .to_vec()
+                }
             },
         },
     };
-    Some(
-        views
-            .into_iter()
-            .filter_map(|view| bounds.window(&view))
-            .collect(),
-    )
+    let mut faces = LightFaces::default();
+    for (i, view) in views.iter().enumerate() {
+        if let Some(view) = bounds.window(view) {
+            if let Some(cube) = &mut cube {
+                cube[i] = Some(faces.views.len() as u32);
+            }
+            faces.views.push(view);
+        }
+    }
+    Some(LightFaces { cube, ..faces })
 }
 
 /// A perspective view on a raster of one unit.

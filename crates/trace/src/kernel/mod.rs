@@ -9,9 +9,12 @@
 
 pub(crate) mod batch;
 pub(crate) mod cluster;
+pub(crate) mod cube;
 pub(crate) mod edges;
+pub(crate) mod pixels;
 pub(crate) mod points;
 pub(crate) mod project;
+pub(crate) mod receivers;
 pub(crate) mod tile;
 
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*};

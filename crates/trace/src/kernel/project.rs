@@ -165,7 +165,7 @@ pub(crate) fn unpack_rests<S: Simd>(simd: S, rests: f32x16<S>) -> [f32x16<S>; 2]
 }
 
 #[inline(always)]
-fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
+pub(crate) fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
     let splat = |v: f64| f64x8::splat(simd, v);
     let center = view.center.as_dvec3();
     let a = [

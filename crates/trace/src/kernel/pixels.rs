@@ -1,0 +1,422 @@
+//! Surface points of a tile's pixels, and where a light sees them, sixteen pixels at a time.
+//!
+//! The hit parameter of a pixel on its triangle is computed in f64 lanes with the operations of
+//! [`crate::exact::attributes`] in its order and without fused multiply-adds, so the points are those of
+//! [`crate::Receiver::along`], bit for bit. Pixels whose sums cancel are reported, to be done one by one.
+//!
+//! Cost: some 30 vector instructions for sixteen pixels and each of their triangles, and 100 to project them.
+
+use fearless_simd::{Simd, dispatch, f32x16, f64x8, mask64x8, prelude::*, u32x16};
+use glam::{DVec3, Vec3, Vec3Swizzles};
+
+use super::project::project_half;
+use super::tile::{BLOCK, NONE};
+use super::{LANES, SimdLevel};
+use crate::view::{Arrangement, View};
+
+/// Lanes of f64 in half a block: two rows of four pixels.
+const HALF: usize = LANES / 2;
+
+/// The eye rays of a tile, as sums of a part for the column and one for the row.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TileRays {
+    parallel: bool,
+    center: DVec3,
+    forward: DVec3,
+    /// Per column of blocks: x, y and z of the four columns, twice.
+    columns: Vec<[[f64; HALF]; 3]>,
+    /// Per half row of blocks: x, y and z of the two rows, four times each.
+    rows: Vec<[[f64; HALF]; 3]>,
+}
+
+impl TileRays {
+    /// The rays of the pixels from (x, y) on, in so many columns and rows of blocks; the operations of
+    /// [`View::ray`].
+    pub(crate) fn set(&mut self, view: &View, [x, y]: [u32; 2], blocks: [u32; 2]) {
+        let [cx, cy] = view.middle;
+        self.parallel = matches!(view.arrangement, Arrangement::Parallel { .. });
+        (self.center, self.forward) = (view.center.as_dvec3(), view.forward);
+        let split = |v: &dyn Fn(usize) -> DVec3| {
+            let mut lanes = [[0.0; HALF]; 3];
+            for i in 0..HALF {
+                let v = v(i);
+                (lanes[0][i], lanes[1][i], lanes[2][i]) = (v.x, v.y, v.z);
+            }
+            lanes
+        };
+        self.columns.clear();
+        self.columns.extend((0..blocks[0]).map(|block| {
+            split(&|i| {
+                let x = f64::from(x + block * BLOCK + i as u32 % BLOCK) + 0.5;
+                view.right * ((x - cx) / view.scale_x)
+            })
+        }));
+        self.rows.clear();
+        self.rows.extend((0..blocks[1] * 2).map(|half| {
+            split(&|i| {
+                let y = f64::from(y + half * (BLOCK / 2) + i as u32 / BLOCK) + 0.5;
+                view.up * ((cy - y) / view.scale_y)
+            })
+        }));
+    }
+
+    /// What half a block's pixels add to the direction, or to the start in a parallel view.
+    #[inline(always)]
+    fn offsets<S: Simd>(&self, simd: S, block: usize, half: usize) -> [f64x8<S>; 3] {
+        let stride = self.columns.len();
+        let column = &self.columns[block % stride];
+        let row = &self.rows[block / stride * 2 + half];
+        [0, 1, 2].map(|axis| f64x8::from_slice(simd, &column[axis]) + f64x8::from_slice(simd, &row[axis]))
+    }
+
+    /// Directions in a perspective view.
+    #[inline(always)]
+    fn directions<S: Simd>(&self, simd: S, block: usize, half: usize) -> [f64x8<S>; 3] {
+        let offsets = self.offsets(simd, block, half);
+        [0, 1, 2].map(|axis| f64x8::splat(simd, self.forward[axis]) + offsets[axis])
+    }
+
+    /// The points at parameter `t`; the operations of [`crate::Receiver::along`].
+    #[inline(always)]
+    fn points<S: Simd>(&self, simd: S, block: usize, half: usize, t: f64x8<S>) -> [f64x8<S>; 3] {
+        let offsets = self.offsets(simd, block, half);
+        [0, 1, 2].map(|axis| {
+            let center = f64x8::splat(simd, self.center[axis]);
+            let forward = f64x8::splat(simd, self.forward[axis]);
+            if self.parallel {
+                center + offsets[axis] + forward * t
+            } else {
+                center + (forward + offsets[axis]) * t
+            }
+        })
+    }
+}
+
+/// A triangle as eye rays from one center meet it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PixelPlane {
+    normal: DVec3,
+    /// Sums of which less than this share is left have cancelled.
+    doubt: DVec3,
+    /// Height of the triangle's plane over the center; not a number if it has cancelled.
+    height: f64,
+}
+
+impl PixelPlane {
+    /// The operations of [`crate::exact::attributes`].
+    pub(crate) fn new(center: DVec3, corners: [Vec3; 3]) -> Self {
+        let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+        let (a0, edge1, edge2) = (v0 - center, v1 - v0, v2 - v0);
+        let normal = edge1.cross(edge2);
+        let height = a0.dot(normal);
+        let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
+        let doubt = terms * (1.0 / (1u64 << 27) as f64);
+        let sound = height.abs() > doubt.dot(a0.abs());
+        Self {
+            normal,
+            doubt,
+            height: if sound { height } else { f64::NAN },
+        }
+    }
+
+    /// One whose every pixel is to be done by itself.
+    pub(crate) fn unsound(self) -> Self {
+        Self {
+            height: f64::NAN,
+            ..self
+        }
+    }
+}
+
+/// Pixels of a block (a bit each) that see the same triangle.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    pub(crate) block: u32,
+    pub(crate) pixels: u32,
+    /// Position of the triangle's plane.
+    pub(crate) plane: u32,
+}
+
+/// Finds the spans of a tile. `plane_of` tells the position of a triangle's plane, or `None` if its pixels do not ask.
+pub(crate) fn find_spans(
+    level: SimdLevel,
+    prims: &[[u32; LANES]],
+    plane_of: &mut dyn FnMut(u32) -> Option<u32>,
+    spans: &mut Vec<Span>,
+    asked: &mut Vec<u16>,
+) {
+    spans.clear();
+    asked.clear();
+    dispatch!(level.0, simd => find_spans_impl(simd, prims, plane_of, spans, asked));
+}
+
+#[inline(always)]
+fn find_spans_impl<S: Simd>(
+    simd: S,
+    prims: &[[u32; LANES]],
+    plane_of: &mut dyn FnMut(u32) -> Option<u32>,
+    spans: &mut Vec<Span>,
+    asked: &mut Vec<u16>,
+) {
+    // Neighbouring blocks often see the same triangle.
+    let mut last = (NONE, None);
+    for (block, prims) in prims.iter().enumerate() {
+        let lanes = u32x16::from_slice(simd, prims);
+        let equal = |prim: u32| lanes.simd_eq(u32x16::splat(simd, prim)).to_bitmask() as u32;
+        let mut left = !equal(NONE) & (u32::MAX >> (32 - LANES));
+        let mut asks = 0;
+        while left != 0 {
+            let prim = prims[left.trailing_zeros() as usize];
+            let pixels = equal(prim);
+            left &= !pixels;
+            if prim != last.0 {
+                last = (prim, plane_of(prim));
+            }
+            if let Some(plane) = last.1 {
+                asks |= pixels as u16;
+                spans.push(Span {
+                    block: block as u32,
+                    pixels,
+                    plane,
+                });
+            }
+        }
+        asked.push(asks);
+    }
+}
+
+/// Hit parameters of the pixels in `spans`, in ascending order of blocks, into `t`. `unsound` gets block and pixels
+/// whose parameter is not good.
+pub(crate) fn hit_parameters(
+    level: SimdLevel,
+    rays: &TileRays,
+    spans: &[Span],
+    planes: &[PixelPlane],
+    t: &mut [[f64; LANES]],
+    unsound: &mut Vec<(u32, u32)>,
+) {
+    dispatch!(level.0, simd => hit_parameters_impl(simd, rays, spans, planes, t, unsound));
+}
+
+#[inline(always)]
+fn hit_parameters_impl<S: Simd>(
+    simd: S,
+    rays: &TileRays,
+    spans: &[Span],
+    planes: &[PixelPlane],
+    t: &mut [[f64; LANES]],
+    unsound: &mut Vec<(u32, u32)>,
+) {
+    let splat = |v: f64| f64x8::splat(simd, v);
+    for same_block in spans.chunk_by(|a, b| a.block == b.block) {
+        let block = same_block[0].block as usize;
+        let mut bad = 0;
+        for half in 0..2 {
+            let shift = half * HALF;
+            let [x, y, z] = rays.directions(simd, block, half);
+            let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+            let mut found = splat(0.0);
+            for span in same_block {
+                let PixelPlane {
+                    normal,
+                    doubt,
+                    height,
+                } = planes[span.plane as usize];
+                let steepness = x * splat(normal.x) + y * splat(normal.y) + z * splat(normal.z);
+                let least = splat(doubt.x) * ax + splat(doubt.y) * ay + splat(doubt.z) * az;
+                let value = splat(height) / steepness;
+                let pixels = mask64x8::from_bitmask(simd, u64::from(span.pixels >> shift) & 0xff);
+                let sound = steepness.abs().simd_gt(least) & value.simd_eq(value);
+                bad |= ((pixels & !sound).to_bitmask() as u32) << shift;
+                found = pixels.select(value, found);
+            }
+            found.store_slice(&mut t[block][shift..shift + HALF]);
+        }
+        if bad != 0 {
+            unsound.push((block as u32, bad));
+        }
+    }
+}
+
+/// The views of a light as receivers are projected into them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LightFaces {
+    pub(crate) views: Vec<View>,
+    /// Of a light among the geometry, the view of each of a cube's faces, in the order +X, -X, +Y, -Y, +Z, -Z.
+    pub(crate) cube: Option<[Option<u32>; 6]>,
+}
+
+/// Sixteen receivers as a light sees them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BlockPoints {
+    pub(crate) x: [f32; LANES],
+    pub(crate) y: [f32; LANES],
+    pub(crate) nearness: [f32; LANES],
+    /// Block of the eye's tile.
+    pub(crate) block: u32,
+}
+
+/// Receivers of a block in one light tile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Entry {
+    /// Light tile, counted through all faces.
+    pub(crate) light_tile: u32,
+    /// The eye's tile.
+    pub(crate) eye_tile: u32,
+    /// Position of the block's points in that tile's list.
+    pub(crate) points: u16,
+    /// A bit for each receiver.
+    pub(crate) lanes: u16,
+    /// The smallest nearness of them.
+    pub(crate) farthest: f32,
+}
+
+/// Side of a light tile in units of the face's raster.
+pub(crate) const LIGHT_TILE: u32 = 64;
+
+/// Projects the surface points of `asked` pixels (a block and a bit for each) of one tile of the eye's. Each receiver that a
+/// caster may come before gets its lane in one of the `entries`, whose points are relative to their light tile.
+pub(crate) fn project_receivers(
+    level: SimdLevel,
+    rays: &TileRays,
+    t: &[[f64; LANES]],
+    asked: &[u16],
+    faces: &LightFaces,
+    eye_tile: u32,
+    points: &mut Vec<BlockPoints>,
+    entries: &mut Vec<Entry>,
+) {
+    dispatch!(level.0, simd => {
+        let out = (eye_tile, points, entries);
+        project_receivers_impl(simd, rays, t, asked, faces, out);
+    });
+}
+
+type Out<'o> = (u32, &'o mut Vec<BlockPoints>, &'o mut Vec<Entry>);
+
+#[inline(always)]
+fn project_receivers_impl<S: Simd>(
+    simd: S,
+    rays: &TileRays,
+    t: &[[f64; LANES]],
+    asked: &[u16],
+    faces: &LightFaces,
+    (eye_tile, points, entries): Out,
+) {
+    for (block, &asked) in asked.iter().enumerate() {
+        if asked == 0 {
+            continue;
+        }
+        let halves = [0, 1].map(|half| {
+            let shift = half * HALF;
+            let t = f64x8::from_slice(simd, &t[block][shift..shift + HALF]);
+            rays.points(simd, block, half, t)
+        });
+        let of_face = faces_of(simd, faces, &halves, u32::from(asked));
+        for (face, lanes) in of_face.into_iter().enumerate().filter(|f| f.1 != 0) {
+            let view = &faces.views[face];
+            let projected = project_block(simd, view, &halves);
+            let place = (view, face as u32, eye_tile);
+            sort_block(simd, place, block, lanes, projected, points, entries);
+        }
+    }
+}
+
+/// Which of the asked points lie in which view.
+#[inline(always)]
+fn faces_of<S: Simd>(simd: S, faces: &LightFaces, halves: &[[f64x8<S>; 3]; 2], asked: u32) -> [u32; 6] {
+    let mut of_face = [0; 6];
+    match (&faces.cube, faces.views.first()) {
+        (_, None) => (),
+        (None, _) => of_face[0] = asked,
+        (Some(cube), Some(view)) => {
+            let of_cube = cube_faces(simd, view.center.as_dvec3(), halves);
+            for (face, lanes) in cube.iter().zip(of_cube) {
+                if let Some(face) = face {
+                    of_face[*face as usize] = lanes & asked;
+                }
+            }
+        }
+    }
+    of_face
+}
+
+#[inline(always)]
+fn project_block<S: Simd>(simd: S, view: &View, halves: &[[f64x8<S>; 3]; 2]) -> [f32x16<S>; 3] {
+    let low = project_half(simd, view, halves[0]);
+    let high = project_half(simd, view, halves[1]);
+    [0, 1, 2].map(|i| low[i].narrow(high[i]))
+}
+
+/// Which points lie in which of a cube's faces: those whose axis is closest to the direction. Rounding at a seam does not
+/// matter, for neighbouring faces overlap.
+#[inline(always)]
+fn cube_faces<S: Simd>(simd: S, center: DVec3, halves: &[[f64x8<S>; 3]; 2]) -> [u32; 6] {
+    let center = center.to_array();
+    let [x, y, z] = [0, 1, 2].map(|axis| {
+        let c = f64x8::splat(simd, center[axis]);
+        (halves[0][axis] - c).narrow(halves[1][axis] - c)
+    });
+    let largest = x.abs().max(y.abs()).max(z.abs());
+    let mut rest = u32::MAX >> (32 - LANES);
+    let mut of_face = [0; 6];
+    for (axis, v) in [x, y, z].into_iter().enumerate() {
+        let along = v.abs().simd_ge(largest).to_bitmask() as u32 & rest;
+        let positive = v.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32;
+        of_face[2 * axis] = along & positive;
+        of_face[2 * axis + 1] = along & !positive;
+        rest &= !along;
+    }
+    of_face
+}
+
+/// Puts the points of a block into the light tiles of one face.
+#[inline(always)]
+fn sort_block<S: Simd>(
+    simd: S,
+    (view, face, eye_tile): (&View, u32, u32),
+    block: usize,
+    asked: u32,
+    [x, y, nearness]: [f32x16<S>; 3],
+    points: &mut Vec<BlockPoints>,
+    entries: &mut Vec<Entry>,
+) {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let within = |v: f32x16<S>, size: u32| v.simd_ge(splat(-1.0)) & v.simd_le(splat(size as f32 + 1.0));
+    // Elsewhere no caster can come before a point.
+    let seen = within(x, view.width) & within(y, view.height) & nearness.simd_gt(splat(0.0));
+    let mut left = seen.to_bitmask() as u32 & asked;
+    if left == 0 {
+        return;
+    }
+    let tiles = [view.width, view.height].map(|size| size / LIGHT_TILE);
+    let index = |v: f32x16<S>, tiles: u32| {
+        let scaled = (v * splat(1.0 / LIGHT_TILE as f32)).max(splat(0.0));
+        scaled.min(splat(tiles as f32 - 1.0)).to_int::<u32x16<S>>()
+    };
+    let (column, row) = (index(x, tiles[0]), index(y, tiles[1]));
+    let tile = row * tiles[0] + column;
+    let position = points.len() as u16;
+    let side = splat(LIGHT_TILE as f32);
+    points.push(BlockPoints {
+        x: (x - column.to_float::<f32x16<S>>() * side).into(),
+        y: (y - row.to_float::<f32x16<S>>() * side).into(),
+        nearness: nearness.into(),
+        block: block as u32,
+    });
+    let tile_of = <[u32; LANES]>::from(tile);
+    while left != 0 {
+        let first = tile_of[left.trailing_zeros() as usize];
+        let same = tile.simd_eq(u32x16::splat(simd, first)).to_bitmask() as u32 & left;
+        left &= !same;
+        let lanes = fearless_simd::mask32x16::from_bitmask(simd, u64::from(same));
+        let farthest = lanes.select(nearness, splat(f32::INFINITY)).reduce_min();
+        entries.push(Entry {
+            light_tile: face * tiles[0] * tiles[1] + first,
+            eye_tile,
+            points: position,
+            lanes: same as u16,
+            farthest,
+        });
+    }
+}

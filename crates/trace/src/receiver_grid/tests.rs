@@ -1,0 +1,257 @@
+//! Lit pixels against brute force, at every level, for eyes and lights everywhere.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::*;
+use crate::test_meshes::{Mesh, axes, looking};
+use crate::{Casts, EyeGrid, EyeGridOptions, Receiver};
+
+/// Every pixel of a view by brute force: `None` where nothing is seen, else the triangle and whether the light
+/// reaches it.
+fn reference(triangles: &Triangles, view: &View, query: &LightQuery) -> Vec<Option<(u32, bool)>> {
+    let finite = |prim: u32| triangles.corners(prim).iter().all(|c| c.is_finite());
+    let prims: Vec<u32> = (0..triangles.len() as u32).filter(|&p| finite(p)).collect();
+    let casters: Vec<u32> = prims
+        .iter()
+        .copied()
+        .filter(|&p| takes_part(&query.light, triangles, (query.rule)(p), p))
+        .collect();
+    let pixel = |i: u32| {
+        let ray = view.pixel_ray(i % view.width, i / view.width);
+        let hit = |&prim: &u32| {
+            let hit = exact::hit(ray.origin, ray.dir, triangles.corners(prim))?;
+            (hit.t > 0.0).then_some((hit.t, prim))
+        };
+        let closest = prims.iter().filter_map(hit);
+        let (t, prim) = closest.reduce(|a, b| if b.0 < a.0 { b } else { a })?;
+        let receiver = Receiver::along(&ray, t, prim);
+        let hides = |&p: &u32| exact::shadows(triangles, p, &receiver, &query.light);
+        let lit = query.faces(triangles, prim) && !casters.iter().any(hides);
+        Some((prim, lit))
+    };
+    let pixels = 0..view.width * view.height;
+    pixels.into_par_iter().map(pixel).collect()
+}
+
+/// Panics where a pixel differs; returns how many are seen, lit, untested and decided exactly.
+fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
+    let triangles = mesh.triangles();
+    let expected = reference(&triangles, &view, query);
+    let mut counts = LitCounts::default();
+    for level in SimdLevel::available() {
+        let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+        let visibility = Visibility::trace(&grid, &|| ());
+        let lit = LitPixels::find(&visibility, &triangles, query, level);
+        for index in 0..grid.tile_count() {
+            let tile = grid.tile(index);
+            for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+                let [px, py] = [tile.x + x, tile.y + y];
+                let want = expected[(py * view.width + px) as usize];
+                let seen = visibility.prim(index, x, y);
+                let got = seen.map(|prim| (prim, lit.is_lit(index, x, y)));
+                let place = || format!("{name}, {}, {:?}, {px} {py}", level.name(), query.light);
+                assert_eq!(got, want, "{}", place());
+            }
+        }
+        counts = lit.counts;
+    }
+    let lit = expected.iter().filter(|e| e.is_some_and(|e| e.1)).count() as u64;
+    let seen = expected.iter().flatten().count() as u64;
+    [seen, lit, counts.untested, counts.exact_pairs]
+}
+
+fn lights() -> Vec<Light> {
+    vec![
+        Light::Point(Vec3::new(3.0, 4.0, 2.0)),
+        Light::Point(Vec3::new(0.05, 0.02, -0.03)),
+        Light::Point(Vec3::new(0.7, 0.9, 0.4)),
+        Light::Point(Vec3::new(0.0, -0.8, 0.3)),
+        Light::Point(Vec3::new(1e4, 2e4, -1e4)),
+        Light::Directional(Vec3::new(0.3, 1.0, 0.2)),
+        Light::Directional(Vec3::Y),
+    ]
+}
+
+fn query(light: Light, view: &View, rule: CastRule<'static>) -> LightQuery<'static> {
+    let eye = match view.arrangement {
+        crate::view::Arrangement::Perspective => Light::Point(view.center),
+        crate::view::Arrangement::Parallel { .. } => Light::Directional((-view.forward).as_vec3()),
+    };
+    LightQuery {
+        light,
+        cone: None,
+        eye,
+        rule,
+    }
+}
+
+const BOTH: CastRule<'static> = &|_| Casts::Both;
+
+fn check_lights(name: &str, mesh: &Mesh, view: View, lights: Vec<Light>) -> [u64; 4] {
+    let mut sum = [0; 4];
+    for light in lights {
+        let counts = check(name, mesh, view, &query(light, &view, BOTH));
+        sum = std::array::from_fn(|i| sum[i] + counts[i]);
+    }
+    sum
+}
+
+#[test]
+fn equals_brute_force_for_lights_everywhere() {
+    for (name, mesh) in [
+        ("soup", Mesh::soup(3, 400, 0.3, 1.0)),
+        ("blob", Mesh::blob(24)),
+        ("awkward", Mesh::awkward()),
+    ] {
+        for eye in [Vec3::new(0.2, 0.5, 2.5), Vec3::new(0.1, 0.05, 0.0)] {
+            let view = looking(eye, Vec3::new(0.05, 0.0, -0.1), 0.5, [70, 45]);
+            let [seen, lit, untested, exact] = check_lights(name, &mesh, view, lights());
+            println!("{name}: {seen} seen, {lit} lit, {untested} untested, {exact} exact pairs");
+            assert!(seen > 7 * 500 && lit > 100);
+        }
+    }
+}
+
+#[test]
+fn equals_brute_force_at_any_scale_and_offset() {
+    for (scale, offset) in [(1e-3, 0.0), (1e-3, 1.0), (1e3, 1e6), (1e6, 1e6), (1.0, 1e5)] {
+        let offset = Vec3::new(offset, -offset, offset * 0.5);
+        let mesh = Mesh::blob(16).scaled(scale, offset);
+        let eye = Vec3::new(0.2, 0.5, 2.5) * scale + offset;
+        let view = looking(eye, offset, 0.5, [60, 40]);
+        let positions = [Vec3::new(2.0, 3.0, 1.0), Vec3::new(0.1, 0.1, 0.0)];
+        let lights = positions.map(|p| Light::Point(p * scale + offset)).to_vec();
+        check_lights(&format!("scale {scale} offset {offset}"), &mesh, view, lights);
+    }
+}
+
+#[test]
+fn small_triangles_and_many_receivers_a_cell() {
+    // From afar a light sees all of the ground in few of its tiles.
+    let mut mesh = Mesh::blob(48).scaled(0.02, Vec3::new(0.01, 0.03, 0.0));
+    let far = Vec3::new(60.0, 0.0, 0.0);
+    let far_z = Vec3::new(0.0, 0.0, 60.0);
+    mesh.triangle([-far - far_z, far - far_z, far_z]);
+    mesh.triangle([
+        Vec3::new(-50.0, 1.0, -50.0),
+        Vec3::new(-50.0, 1.1, -50.0),
+        Vec3::new(-50.0, 1.0, -49.0),
+    ]);
+    let view = looking(Vec3::new(0.05, 0.08, 0.1), Vec3::ZERO, 0.5, [160, 100]);
+    let lights = vec![
+        Light::Point(Vec3::new(0.1, 0.2, 0.05)),
+        Light::Directional(Vec3::new(0.4, 1.0, 0.3)),
+    ];
+    let [seen, lit, _, exact] = check_lights("far ground", &mesh, view, lights);
+    println!("{seen} seen, {lit} lit, {exact} exact pairs");
+    assert!(lit > 1000 && lit < seen);
+}
+
+#[test]
+fn an_eye_with_parallel_rays() {
+    let mesh = Mesh::soup(21, 300, 0.3, 1.0);
+    let axes = axes(DVec3::new(-0.3, -0.5, -1.0));
+    let view = View::parallel(Vec3::new(0.9, 1.5, 3.0), axes, [1.5, 1.0], 40.0, [60, 40]);
+    let [_, lit, ..] = check_lights("parallel eye", &mesh, view, lights());
+    assert!(lit > 500);
+}
+
+#[test]
+fn back_faces_and_nothing_as_casters() {
+    let mesh = Mesh::blob(20);
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [60, 40]);
+    let some: CastRule = &|prim| [Casts::Back, Casts::Nothing, Casts::Both][prim as usize % 3];
+    let back: CastRule = &|_| Casts::Back;
+    for rule in [back, some] {
+        for light in lights() {
+            check("rules", &mesh, view, &query(light, &view, rule));
+        }
+    }
+}
+
+#[test]
+fn geometry_too_large_to_be_projected() {
+    let mut mesh = Mesh::soup(2, 30, 0.3, 1.0);
+    // Out of the eye's sight.
+    mesh.triangle([
+        Vec3::new(1e33, 1.0, 1e33),
+        Vec3::new(-1e33, 2.0, 1e33),
+        Vec3::new(0.0, 1.5, 5.0),
+    ]);
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [30, 20]);
+    check_lights("huge", &mesh, view, lights());
+}
+
+#[test]
+fn lights_that_are_no_numbers_reach_what_faces_them() {
+    let mesh = Mesh::soup(4, 60, 0.3, 1.0);
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [30, 20]);
+    let lights = vec![
+        Light::Point(Vec3::NAN),
+        Light::Directional(Vec3::ZERO),
+        Light::Directional(Vec3::new(f32::INFINITY, 1.0, 0.0)),
+    ];
+    check_lights("no numbers", &mesh, view, lights);
+}
+
+#[test]
+fn a_spot_lights_cone_is_one_face() {
+    let mesh = Mesh::soup(9, 300, 0.3, 1.0);
+    let triangles = mesh.triangles();
+    let position = Vec3::new(0.1, 2.5, 0.2);
+    let axis = DVec3::new(0.1, -1.0, 0.05).normalize();
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [90, 60]);
+    let with = |cone| LightQuery {
+        cone,
+        ..query(Light::Point(position), &view, BOTH)
+    };
+    let half_angle = 0.5;
+    let level = SimdLevel::detect();
+    let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+    let visibility = Visibility::trace(&grid, &|| ());
+    let [all, within] = [None, Some(Cone { axis, half_angle })]
+        .map(|cone| LitPixels::find(&visibility, &triangles, &with(cone), level));
+    let mut compared = 0;
+    for (index, tile) in visibility.tiles().iter().enumerate() {
+        for (x, y) in (0..tile.tile.height).flat_map(|y| (0..tile.tile.width).map(move |x| (x, y))) {
+            let (block, lane) = place(tile.stride, x, y);
+            let Some(receiver) = tile.receiver(&view, &triangles, block as u32, lane as u32) else {
+                continue;
+            };
+            if (receiver.point - position.as_dvec3()).angle_between(axis) < half_angle {
+                assert_eq!(
+                    all.is_lit(index as u32, x, y),
+                    within.is_lit(index as u32, x, y),
+                    "{receiver:?}"
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 500, "{compared}");
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same() {
+    let mesh = Mesh::soup(12, 2000, 0.2, 1.0);
+    let triangles = mesh.triangles();
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [300, 200]);
+    let with = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("a pool");
+        pool.install(|| {
+            let level = SimdLevel::detect();
+            let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+            let visibility = Visibility::trace(&grid, &|| ());
+            let query = query(Light::Point(Vec3::new(0.1, 0.2, 0.3)), &view, BOTH);
+            let lit = LitPixels::find(&visibility, &triangles, &query, level);
+            let bits: Vec<_> = lit.tiles.into_iter().map(|t| t.lit).collect();
+            (bits, lit.counts)
+        })
+    };
+    let one = with(1);
+    assert!(one == with(2) && one == with(5));
+}

@@ -1,0 +1,133 @@
+//! What the eye sees, kept for a whole frame: the closest triangle of every pixel.
+//!
+//! HM08 §5.2 names two ways to serve many lights within little memory: grids on demand, or one light at a time over
+//! stored eye hits. This is the second: only the triangle is stored, for the hit point follows from the view's
+//! formula ([`crate::exact::attributes`]). Layout: tile by tile of the [`EyeGrid`], blocks of 4 x 4 pixels, 4 bytes a
+//! pixel.
+
+use rayon::prelude::*;
+
+use crate::kernel::LANES;
+use crate::kernel::tile::{BLOCK, NONE};
+use crate::{EyeGrid, Receiver, Tile, TileHits, Triangles, View, ViewRay, exact};
+
+/// The closest triangle of every pixel of a view.
+#[derive(Clone, Debug)]
+pub struct Visibility {
+    view: View,
+    tiles: Vec<VisibleTile>,
+    exact_pixels: u64,
+}
+
+/// The pixels of one tile.
+#[derive(Clone, Debug)]
+pub(crate) struct VisibleTile {
+    pub(crate) tile: Tile,
+    /// Blocks in a row.
+    pub(crate) stride: u32,
+    /// Triangle of every pixel, block by block; [`NONE`] where there is none, and outside of the raster.
+    pub(crate) prims: Vec<[u32; LANES]>,
+}
+
+impl Visibility {
+    /// Traces all tiles of a grid, on all threads of the current rayon pool; `done` is told after each, from any
+    /// thread.
+    pub fn trace(grid: &EyeGrid, done: &(dyn Fn() + Sync)) -> Self {
+        let traced: Vec<(VisibleTile, u64)> = (0..grid.tile_count())
+            .into_par_iter()
+            .map_init(TileHits::default, |hits, index| {
+                let tile = grid.tile(index);
+                grid.trace_tile(&tile, hits);
+                done();
+                (VisibleTile::of(tile, hits), hits.exact_pixels as u64)
+            })
+            .collect();
+        let exact_pixels = traced.iter().map(|t| t.1).sum();
+        Self {
+            view: *grid.view(),
+            tiles: traced.into_iter().map(|t| t.0).collect(),
+            exact_pixels,
+        }
+    }
+
+    /// The view it was seen in.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// Triangle seen by pixel (x, y) of a tile of the grid, counted from the tile's corner.
+    #[inline]
+    pub fn prim(&self, tile: u32, x: u32, y: u32) -> Option<u32> {
+        let tile = &self.tiles[tile as usize];
+        let (block, lane) = place(tile.stride, x, y);
+        let prim = tile.prims[block][lane];
+        (prim != NONE).then_some(prim)
+    }
+
+    /// Pairs of pixel and triangle that were settled by the exact decision.
+    pub fn exact_pixels(&self) -> u64 {
+        self.exact_pixels
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(|t| t.prims.capacity() * 4 * LANES).sum()
+    }
+
+    pub(crate) fn tiles(&self) -> &[VisibleTile] {
+        &self.tiles
+    }
+}
+
+/// Block and lane of a pixel of a tile.
+#[inline]
+pub(crate) fn place(stride: u32, x: u32, y: u32) -> (usize, usize) {
+    let block = (y / BLOCK) * stride + x / BLOCK;
+    let lane = (y % BLOCK) * BLOCK + x % BLOCK;
+    (block as usize, lane as usize)
+}
+
+impl VisibleTile {
+    fn of(tile: Tile, hits: &TileHits) -> Self {
+        let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
+        let mut prims = hits.prims().to_vec();
+        prims.truncate((stride * rows) as usize);
+        // Blocks reach beyond the raster's edge.
+        if tile.width % BLOCK != 0 || tile.height % BLOCK != 0 {
+            for y in 0..rows * BLOCK {
+                for x in 0..stride * BLOCK {
+                    if x >= tile.width || y >= tile.height {
+                        let (block, lane) = place(stride, x, y);
+                        prims[block][lane] = NONE;
+                    }
+                }
+            }
+        }
+        Self { tile, stride, prims }
+    }
+
+    /// The ray of a pixel, by block and lane.
+    #[inline]
+    pub(crate) fn ray(&self, view: &View, block: u32, lane: u32) -> ViewRay {
+        let x = self.tile.x + block % self.stride * BLOCK + lane % BLOCK;
+        let y = self.tile.y + block / self.stride * BLOCK + lane / BLOCK;
+        view.pixel_ray(x, y)
+    }
+
+    /// The surface point a pixel sees, by block and lane; `None` if it sees nothing.
+    pub(crate) fn receiver(
+        &self,
+        view: &View,
+        triangles: &Triangles,
+        block: u32,
+        lane: u32,
+    ) -> Option<Receiver> {
+        let prim = self.prims[block as usize][lane as usize];
+        if prim == NONE {
+            return None;
+        }
+        let ray = self.ray(view, block, lane);
+        let hit = exact::attributes(ray.origin, ray.dir, triangles.corners(prim))?;
+        Some(Receiver::along(&ray, hit.t, prim))
+    }
+}
