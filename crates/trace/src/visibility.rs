@@ -17,6 +17,7 @@ pub struct Visibility {
     view: View,
     tiles: Vec<VisibleTile>,
     exact_pixels: u64,
+    seen: u64,
 }
 
 /// The pixels of one tile.
@@ -43,7 +44,10 @@ impl Visibility {
             })
             .collect();
         let exact_pixels = traced.iter().map(|t| t.1).sum();
+        let prims = traced.iter().flat_map(|t| &t.0.prims);
+        let seen = prims.map(|block| block.iter().filter(|&&p| p != NONE).count() as u64);
         Self {
+            seen: seen.sum(),
             view: *grid.view(),
             tiles: traced.into_iter().map(|t| t.0).collect(),
             exact_pixels,
@@ -62,6 +66,11 @@ impl Visibility {
         let (block, lane) = place(tile.stride, x, y);
         let prim = tile.prims[block][lane];
         (prim != NONE).then_some(prim)
+    }
+
+    /// Pixels that see a triangle.
+    pub fn seen(&self) -> u64 {
+        self.seen
     }
 
     /// Pairs of pixel and triangle that were settled by the exact decision.

@@ -32,17 +32,22 @@ fn outside_bits_impl<S: Simd>(simd: S, center: Vec3, triangles: &Triangles, firs
     let axes = [triangles.x, triangles.y, triangles.z].map(|values| &values[range.clone()]);
     for (block, out) in out.chunks_mut(LANES).enumerate() {
         let from = block * LANES;
-        let relative = [0, 1, 2].map(|axis| {
-            let values = &axes[axis][from..from + out.len()];
+        let relative = |values: &[f32], center: f32| {
+            let values = &values[from..from + out.len()];
             let lanes = if values.len() == LANES {
                 f32x16::from_slice(simd, values)
             } else {
                 f32x16::from_fn(simd, |i| values.get(i).copied().unwrap_or(0.0))
             };
             let (low, high) = lanes.widen();
-            let c = f64x8::splat(simd, f64::from(center[axis]));
+            let c = f64x8::splat(simd, f64::from(center));
             (low - c).narrow(high - c)
-        });
+        };
+        let relative = [
+            relative(axes[0], center.x),
+            relative(axes[1], center.y),
+            relative(axes[2], center.z),
+        ];
         let bits: [u32; LANES] = bits(simd, relative).into();
         out.copy_from_slice(&bits[..out.len()]);
     }

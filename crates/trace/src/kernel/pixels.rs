@@ -64,31 +64,34 @@ impl TileRays {
     #[inline(always)]
     fn offsets<S: Simd>(&self, simd: S, block: usize, half: usize) -> [f64x8<S>; 3] {
         let stride = self.columns.len();
-        let column = &self.columns[block % stride];
-        let row = &self.rows[block / stride * 2 + half];
-        [0, 1, 2].map(|axis| f64x8::from_slice(simd, &column[axis]) + f64x8::from_slice(simd, &row[axis]))
+        let [cx, cy, cz] = &self.columns[block % stride];
+        let [rx, ry, rz] = &self.rows[block / stride * 2 + half];
+        let load = |lanes: &[f64; HALF]| f64x8::from_slice(simd, lanes);
+        [load(cx) + load(rx), load(cy) + load(ry), load(cz) + load(rz)]
     }
 
     /// Directions in a perspective view.
     #[inline(always)]
     fn directions<S: Simd>(&self, simd: S, block: usize, half: usize) -> [f64x8<S>; 3] {
-        let offsets = self.offsets(simd, block, half);
-        [0, 1, 2].map(|axis| f64x8::splat(simd, self.forward[axis]) + offsets[axis])
+        let [x, y, z] = self.offsets(simd, block, half);
+        let splat = |v: f64| f64x8::splat(simd, v);
+        let DVec3 { x: fx, y: fy, z: fz } = self.forward;
+        [splat(fx) + x, splat(fy) + y, splat(fz) + z]
     }
 
     /// The points at parameter `t`; the operations of [`crate::Receiver::along`].
     #[inline(always)]
     fn points<S: Simd>(&self, simd: S, block: usize, half: usize, t: f64x8<S>) -> [f64x8<S>; 3] {
-        let offsets = self.offsets(simd, block, half);
-        [0, 1, 2].map(|axis| {
-            let center = f64x8::splat(simd, self.center[axis]);
-            let forward = f64x8::splat(simd, self.forward[axis]);
-            if self.parallel {
-                center + offsets[axis] + forward * t
-            } else {
-                center + (forward + offsets[axis]) * t
-            }
-        })
+        let splat = |v: f64| f64x8::splat(simd, v);
+        let (center, forward) = (self.center, self.forward);
+        let (cx, cy, cz) = (splat(center.x), splat(center.y), splat(center.z));
+        let (fx, fy, fz) = (splat(forward.x), splat(forward.y), splat(forward.z));
+        let [x, y, z] = self.offsets(simd, block, half);
+        if self.parallel {
+            [cx + x + fx * t, cy + y + fy * t, cz + z + fz * t]
+        } else {
+            [cx + (fx + x) * t, cy + (fy + y) * t, cz + (fz + z) * t]
+        }
     }
 }
 
@@ -307,11 +310,11 @@ fn project_receivers_impl<S: Simd>(
         if asked == 0 {
             continue;
         }
-        let halves = [0, 1].map(|half| {
-            let shift = half * HALF;
-            let t = f64x8::from_slice(simd, &t[block][shift..shift + HALF]);
-            rays.points(simd, block, half, t)
-        });
+        let (low, high) = t[block].split_at(HALF);
+        let halves = [
+            rays.points(simd, block, 0, f64x8::from_slice(simd, low)),
+            rays.points(simd, block, 1, f64x8::from_slice(simd, high)),
+        ];
         let of_face = faces_of(simd, faces, &halves, u32::from(asked));
         for (face, lanes) in of_face.into_iter().enumerate().filter(|f| f.1 != 0) {
             let view = &faces.views[face];
@@ -345,28 +348,38 @@ fn faces_of<S: Simd>(simd: S, faces: &LightFaces, halves: &[[f64x8<S>; 3]; 2], a
 fn project_block<S: Simd>(simd: S, view: &View, halves: &[[f64x8<S>; 3]; 2]) -> [f32x16<S>; 3] {
     let low = project_half(simd, view, halves[0]);
     let high = project_half(simd, view, halves[1]);
-    [0, 1, 2].map(|i| low[i].narrow(high[i]))
+    [
+        low[0].narrow(high[0]),
+        low[1].narrow(high[1]),
+        low[2].narrow(high[2]),
+    ]
 }
 
 /// Which points lie in which of a cube's faces: those whose axis is closest to the direction. Rounding at a seam does not
 /// matter, for neighbouring faces overlap.
 #[inline(always)]
 fn cube_faces<S: Simd>(simd: S, center: DVec3, halves: &[[f64x8<S>; 3]; 2]) -> [u32; 6] {
-    let center = center.to_array();
-    let [x, y, z] = [0, 1, 2].map(|axis| {
-        let c = f64x8::splat(simd, center[axis]);
-        (halves[0][axis] - c).narrow(halves[1][axis] - c)
-    });
+    let [low, high] = halves;
+    let axis = |low: f64x8<S>, high: f64x8<S>, center: f64| {
+        let center = f64x8::splat(simd, center);
+        (low - center).narrow(high - center)
+    };
+    let x = axis(low[0], high[0], center.x);
+    let y = axis(low[1], high[1], center.y);
+    let z = axis(low[2], high[2], center.z);
     let largest = x.abs().max(y.abs()).max(z.abs());
     let mut rest = u32::MAX >> (32 - LANES);
     let mut of_face = [0; 6];
-    for (axis, v) in [x, y, z].into_iter().enumerate() {
+    let mut take = |axis: usize, v: f32x16<S>| {
         let along = v.abs().simd_ge(largest).to_bitmask() as u32 & rest;
         let positive = v.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32;
         of_face[2 * axis] = along & positive;
         of_face[2 * axis + 1] = along & !positive;
         rest &= !along;
-    }
+    };
+    take(0, x);
+    take(1, y);
+    take(2, z);
     of_face
 }
 

@@ -23,8 +23,9 @@ const NOBODY: u32 = u32::MAX;
 /// Receivers a cell is to have about; more make more pairs that do not meet, fewer leave lanes empty.
 const RECEIVERS_A_CELL: usize = 24;
 
-/// Smallest and largest number of cells in each direction of a light tile.
-const CELLS: [u32; 2] = [16, 64];
+/// Smallest and largest number of blocks of cells in each direction of a light tile. A cell is at most four raster units
+/// wide, for no farther outside of its rectangle a triangle's edges are known.
+const BLOCKS: [u32; 2] = [4, 16];
 
 /// A light tile's receivers.
 #[derive(Clone, Debug, Default)]
@@ -95,12 +96,10 @@ impl ReceiverTile {
     #[inline(always)]
     fn set_impl<S: Simd>(&mut self, simd: S, entries: &[Entry], points_of: PointsOf) {
         let receivers: usize = entries.iter().map(|e| e.lanes.count_ones() as usize).sum();
-        let mut cells = CELLS[0];
-        while cells < CELLS[1] && receivers > (cells * cells) as usize * RECEIVERS_A_CELL {
-            cells *= 2;
-        }
-        self.side = (LIGHT_TILE / cells) as f32;
-        self.blocks = cells / BLOCK;
+        let wanted = (receivers as f32 / RECEIVERS_A_CELL as f32).sqrt() / BLOCK as f32;
+        self.blocks = (wanted.ceil() as u32).clamp(BLOCKS[0], BLOCKS[1]);
+        let cells = self.blocks * BLOCK;
+        self.side = LIGHT_TILE as f32 / cells as f32;
         let splat = |v: f32| f32x16::splat(simd, v);
         let scale = splat(1.0 / self.side);
         let last = splat((cells - 1) as f32);
@@ -341,12 +340,20 @@ impl<S: Simd> CellReach<S> {
         let ((x_low, x_high), (y_low, y_high)) = (ends(x), ends(y));
         let pick = |slope: f32, low: f32x16<S>, high: f32x16<S>| if slope > 0.0 { high } else { low };
         Self {
-            edge_x: [0, 1, 2].map(|i| pick(record.a[i], x_low, x_high)),
-            edge_y: [0, 1, 2].map(|i| pick(record.b[i], y_low, y_high)),
+            edge_x: [
+                pick(record.a[0], x_low, x_high),
+                pick(record.a[1], x_low, x_high),
+                pick(record.a[2], x_low, x_high),
+            ],
+            edge_y: [
+                pick(record.b[0], y_low, y_high),
+                pick(record.b[1], y_low, y_high),
+                pick(record.b[2], y_low, y_high),
+            ],
             low: [x_low, y_low],
             high: [x_high, y_high],
-            min: area.min.map(splat),
-            max: area.max.map(splat),
+            min: [splat(area.min[0]), splat(area.min[1])],
+            max: [splat(area.max[0]), splat(area.max[1])],
             grows: [record.nearness_x > 0.0, record.nearness_y > 0.0],
             nearest: splat(area.nearest),
         }
@@ -363,12 +370,13 @@ impl<S: Simd> CellReach<S> {
         let mut reached = edge(0).min(edge(1)).min(edge(2)).simd_ge(splat(-1.01));
         let bounded = record.floor == 0.0 && record.ceiling == f32::INFINITY;
         // The part of each cell that lies in the caster's rectangle, for its plane is known only there.
-        let [x, y] = [0, 1].map(|axis| {
+        let mut part = |axis: usize| {
             let low = (self.low[axis] + corner[axis]).max(self.min[axis]);
             let high = (self.high[axis] + corner[axis]).min(self.max[axis]);
             reached = reached & (low - high).simd_le(splat(2.0 * SLACK));
             if self.grows[axis] { high } else { low }
-        });
+        };
+        let (x, y) = (part(0), part(1));
         if bounded {
             let plane = splat(record.nearness_x)
                 .mul_add(x, splat(record.nearness_y).mul_add(y, splat(record.nearness)));

@@ -80,8 +80,12 @@ pub struct LightQuery<'q> {
     pub rule: CastRule<'q>,
 }
 
-/// Light tiles of a face in each direction.
-const TILES: u32 = 32;
+/// Pixels of a face for each light tile: enough that cells of the largest size are full, for half of a face is empty
+/// as a rule and pixels that turn away do not count. Tests have small pictures and want many tiles all the same.
+const PIXELS_A_TILE: u64 = if cfg!(test) { 150 } else { 6000 };
+
+/// Largest number of light tiles of a face in each direction.
+const MAX_TILES: u32 = 32;
 
 impl LitPixels {
     /// Finds the pixels that a light reaches: those whose triangle turns the same side to the light as to the eye, and
@@ -95,9 +99,12 @@ impl LitPixels {
         let Some(mut faces) = crate::light_views::views(&query.light, triangles, query.cone) else {
             return Self::one_by_one(visibility, triangles, query);
         };
+        let pixels = visibility.seen() / (faces.views.len() as u64).max(1);
+        let tiles = ((pixels / PIXELS_A_TILE) as f64).sqrt().ceil() as u32;
+        let tiles = tiles.clamp(1, MAX_TILES);
         for view in &mut faces.views {
             let size = [f64::from(view.width), f64::from(view.height)];
-            *view = view.window([0.0; 2], size, [TILES * LIGHT_TILE; 2]);
+            *view = view.window([0.0; 2], size, [tiles * LIGHT_TILE; 2]);
         }
         let gathered = gather::gather(visibility, triangles, query, &faces, level);
         let mut lit = Self {
@@ -116,7 +123,7 @@ impl LitPixels {
                 })
                 .collect(),
         };
-        let sorted = SortedEntries::of(&gathered, faces.views.len());
+        let sorted = SortedEntries::of(&gathered, faces.views.len() * (tiles * tiles) as usize);
         lit.counts.bytes = gathered.iter().map(Gathered::bytes).sum::<usize>() + sorted.bytes();
         let parts = FaceParts::of(triangles, &faces, level);
         let (mut vertices, mut of_a_face) = (Vec::new(), 0);
@@ -210,8 +217,7 @@ struct SortedEntries {
 }
 
 impl SortedEntries {
-    fn of(gathered: &[Gathered], faces: usize) -> Self {
-        let tiles = faces * (TILES * TILES) as usize;
+    fn of(gathered: &[Gathered], tiles: usize) -> Self {
         let all = || gathered.iter().flat_map(|g| &g.entries);
         let mut starts = vec![0u32; tiles + 1];
         let mut farthest = vec![f32::INFINITY; tiles];
@@ -268,8 +274,9 @@ struct FaceScene<'f> {
 impl FaceScene<'_> {
     /// Draws all casters of a face and enters what is left lit; returns the bytes held at most.
     fn draw(&self, sorted: &SortedEntries, vertices: &mut Vec<RasterVertex>, lit: &mut LitPixels) -> usize {
-        let first = (self.face * TILES * TILES) as usize;
-        let farthest = &sorted.farthest[first..first + (TILES * TILES) as usize];
+        let tiles = self.view.width / LIGHT_TILE;
+        let first = (self.face * tiles * tiles) as usize;
+        let farthest = &sorted.farthest[first..first + (tiles * tiles) as usize];
         let asked: Vec<usize> = (0..farthest.len())
             .filter(|&t| farthest[t] < f32::INFINITY)
             .collect();
@@ -283,7 +290,7 @@ impl FaceScene<'_> {
         let drawn: Vec<_> = asked
             .par_iter()
             .map_init(LightTileWork::default, |work, &tile| {
-                let corner = [tile as u32 % TILES, tile as u32 / TILES].map(|i| (i * LIGHT_TILE) as f32);
+                let corner = [tile as u32 % tiles, tile as u32 / tiles].map(|i| (i * LIGHT_TILE) as f32);
                 let entries = sorted.of_tile(first + tile);
                 self.draw_tile(work, entries, bins.cell(tile), vertices, (corner, rounding))
             })
@@ -303,10 +310,11 @@ impl FaceScene<'_> {
 
     /// Sorts the triangles that may matter into light tiles.
     fn bin(&self, vertices: &[RasterVertex], farthest: &[f32]) -> Bins {
+        let tiles = self.view.width / LIGHT_TILE;
         let grid = CellGrid {
-            cells: [TILES; 2],
+            cells: [tiles; 2],
             side: LIGHT_TILE as f32,
-            size: [(TILES * LIGHT_TILE) as f32; 2],
+            size: [self.view.width as f32; 2],
             pixel_centres: false,
         };
         let keep = |prim: u32| {
@@ -314,7 +322,7 @@ impl FaceScene<'_> {
                 return false;
             }
             let corners = self.triangles.indices[prim as usize].map(|i| vertices[i as usize]);
-            may_matter(&corners, farthest)
+            may_matter(&corners, farthest, tiles)
                 && takes_part(&self.query.light, self.triangles, (self.query.rule)(prim), prim)
         };
         Bins::build(self.view, self.triangles, vertices, &grid, Binning::Overlap, keep)
@@ -323,26 +331,26 @@ impl FaceScene<'_> {
 
 /// Whether a triangle may come before a receiver of the light tiles that its rectangle touches.
 #[inline]
-fn may_matter(corners: &[RasterVertex; 3], farthest: &[f32]) -> bool {
+fn may_matter(corners: &[RasterVertex; 3], farthest: &[f32], tiles: u32) -> bool {
     let [a, b, c] = corners;
     if !(a.nearness > 0.0 && b.nearness > 0.0 && c.nearness > 0.0) {
         // Behind the light, if all are. Otherwise nothing simple can be said.
         return !(a.nearness < 0.0 && b.nearness < 0.0 && c.nearness < 0.0);
     }
-    let tiles = |v: [f32; 3]| {
+    let last = (tiles - 1) as f32;
+    let range = |v: [f32; 3]| {
         // Wider than the binning's own slack.
         let low = (v[0].min(v[1]).min(v[2]) - 1.0) * (1.0 / LIGHT_TILE as f32);
         let high = (v[0].max(v[1]).max(v[2]) + 1.0) * (1.0 / LIGHT_TILE as f32);
-        let last = (TILES - 1) as f32;
-        (high >= 0.0 && low <= TILES as f32)
+        (high >= 0.0 && low <= tiles as f32)
             .then(|| low.clamp(0.0, last) as u32..=high.clamp(0.0, last) as u32)
     };
-    let (Some(columns), Some(rows)) = (tiles([a.x, b.x, c.x]), tiles([a.y, b.y, c.y])) else {
+    let (Some(columns), Some(rows)) = (range([a.x, b.x, c.x]), range([a.y, b.y, c.y])) else {
         return false;
     };
     let nearest = a.nearness.max(b.nearness).max(c.nearness) * (1.0 + 2.0 * NEARNESS_BAND);
     rows.into_iter().any(|row| {
-        let row = (row * TILES) as usize;
+        let row = (row * tiles) as usize;
         farthest[row + *columns.start() as usize..=row + *columns.end() as usize]
             .iter()
             .any(|&f| nearest >= f)
