@@ -192,7 +192,8 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
         };
         let run = || {
             let level = SimdLevel::detect();
-            let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+            let options = EyeGridOptions::default();
+            let grid = EyeGrid::build_clustered(view, triangles, &frame.clusters, options, level);
             let visibility = Visibility::trace(&grid, &|| ());
             LitPixels::find(&visibility, &triangles, &query, level)
         };
