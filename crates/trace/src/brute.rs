@@ -5,6 +5,8 @@
 
 use std::cmp::Ordering;
 
+use glam::Vec3;
+
 use crate::exact::{self, ExactHit};
 use crate::{Accel, Hit, Light, Ray, Receiver, Triangles};
 
@@ -41,7 +43,12 @@ impl<'a> BruteForce<'a> {
 /// The exact hit of one triangle if it lies in the ray's range.
 #[inline]
 pub fn hit_in_range(triangles: &Triangles, prim: u32, ray: &Ray) -> Option<ExactHit> {
-    let corners = triangles.corners(prim);
+    hit_corners(triangles.corners(prim), ray)
+}
+
+/// [`hit_in_range`] of a triangle with these corners.
+#[inline]
+pub(crate) fn hit_corners(corners: [Vec3; 3], ray: &Ray) -> Option<ExactHit> {
     if !corners.iter().all(|p| p.is_finite()) {
         return None;
     }

@@ -13,7 +13,8 @@
 //! construction, without a tie rule, at any scale and offset.
 //!
 //! The parameter is t = (a0 . N) / (d . N) with N = (v1 - v0) x (v2 - v0), in f64, in this order of operations:
-//! it decides which of two triangles is closer, equal values going to the smaller id.
+//! it decides which of two triangles is closer, equal values going to the smaller id. Where cancellation has left
+//! less than a few digits it is computed without loss, so that every `t` is within 2^-22 of its true value.
 //!
 //! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, `a_i = fl(v_i - o)`;
 //! for f32 input whose exponents differ by less than 29 that is exact.
@@ -21,6 +22,7 @@
 use glam::{DVec3, Vec3, Vec3Swizzles};
 use robust::{Coord3D, orient3d};
 
+use crate::determinant::determinant;
 use crate::{Light, Receiver, Triangles};
 
 /// An exact hit: parameters in f64.
@@ -110,39 +112,24 @@ pub fn attributes(origin: DVec3, dir: DVec3, corners: [Vec3; 3]) -> Option<Exact
     Some(if sound {
         hit
     } else {
-        confined(hit, dir, corners.map(|c| c.as_dvec3() - origin))
+        careful(dir, corners.map(|c| c.as_dvec3() - origin))
     })
 }
 
-/// The hit moved to where the line passes the triangle's box, and to the side of the origin on which it truly lies.
-/// Hierarchies and grids prune by boxes, and grids know exactly what lies in front: a `t` that cancellation has put
-/// elsewhere would be found or not depending on the structure.
+/// The same values from determinants that have lost nothing. Structures prune by where hits lie, and grids know
+/// exactly what lies in front: a `t` that cancellation has put elsewhere would be found or not depending on the
+/// structure.
 #[cold]
-fn confined(hit: ExactHit, dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
-    let (low, high) = (a0.min(a1).min(a2), a0.max(a1).max(a2));
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-    for axis in 0..3 {
-        if dir[axis] != 0.0 {
-            let (s, t) = (low[axis] / dir[axis], high[axis] / dir[axis]);
-            enter = enter.max(s.min(t));
-            leave = leave.min(s.max(t));
-        }
+fn careful(dir: DVec3, [a0, a1, a2]: [DVec3; 3]) -> ExactHit {
+    // d . N is the sum of the edge functions, which have one sign on a hit.
+    let [e0, e1, e2] = [(a1, a2), (a2, a0), (a0, a1)].map(|(a, b)| determinant(dir, a, b));
+    let steepness = e0 + e1 + e2;
+    ExactHit {
+        // An origin in the plane is at 0, not at -0.
+        t: determinant(a0, a1, a2) / steepness + 0.0,
+        u: e1 / steepness,
+        v: e2 / steepness,
     }
-    // All three may be no number; comparisons are written so that it does not survive.
-    let share = |x: f64, most: f64| if x > 0.0 { x.min(most) } else { 0.0 };
-    let u = share(hit.u, 1.0);
-    let v = share(hit.v, 1.0 - u);
-    let t = hit.t.max(enter).min(leave);
-    // t = a0 . N / d . N, and the edge functions of a hit have the sign of d . N.
-    let edges = [volume(a1, a2, dir), volume(a2, a0, dir), volume(a0, a1, dir)];
-    let steepness = edges.into_iter().find(|&e| e != 0.0).unwrap_or(0.0);
-    let ahead = volume(a0, a1, a2) * steepness.signum();
-    let t = match ahead {
-        _ if ahead == 0.0 => 0.0,
-        _ if ahead > 0.0 => t.max(f64::MIN_POSITIVE),
-        _ => t.min(-f64::MIN_POSITIVE),
-    };
-    ExactHit { t, u, v }
 }
 
 /// Which side of a triangle a light sees: positive for the front, negative for the back, 0 edge-on. The sign is
@@ -163,10 +150,12 @@ pub fn side(corners: [Vec3; 3], light: &Light) -> f64 {
 /// error bound left out.
 #[inline]
 pub fn shadows(triangles: &Triangles, prim: u32, receiver: &Receiver, light: &Light) -> bool {
-    if prim == receiver.prim {
-        return false;
-    }
-    let corners = triangles.corners(prim);
+    prim != receiver.prim && blocks(triangles.corners(prim), receiver, light)
+}
+
+/// [`shadows`] for a triangle with these corners, which is not the receiver's own.
+#[inline]
+pub fn blocks(corners: [Vec3; 3], receiver: &Receiver, light: &Light) -> bool {
     match *light {
         Light::Point(position) => {
             // From the light, so that all rays of one light see the same rounded corners.

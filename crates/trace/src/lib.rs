@@ -5,7 +5,10 @@
 //! | eye rays of one camera | [`EyeGrid`] | HM08 §5.1 |
 //! | hard shadow rays of one light, from all that the eye sees | [`LitPixels`] | HM08 §5.2, turned round |
 //! | hard shadow rays of one light, from any points | [`PointLightGrid`] | HM08 §5.2 |
+//! | rays that nearly share an origin, and any other | [`PerspectiveGrids`] | HM08 §5.3 |
+//! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | any ray | [`Bvh`] | general hierarchy |
+//! | any ray | [`Grid3`] in world space | the regular grid of HM08, Table 5 |
 //! | any ray, by definition right | [`BruteForce`] | [`exact`] |
 //!
 //! All of them give the same answers, bit for bit: whether a ray meets a triangle is one exact decision
@@ -19,12 +22,18 @@ mod bins;
 pub mod brute;
 pub mod bvh;
 mod clusters;
+mod determinant;
 pub mod exact;
 mod eye_grid;
+mod faces;
+mod grid3;
 mod kernel;
 mod light_grid;
 mod light_views;
+mod moving;
+mod perspective_grids;
 mod precise;
+mod queries;
 mod ray;
 mod receiver_grid;
 pub mod space;
@@ -41,11 +50,16 @@ pub use brute::BruteForce;
 pub use bvh::Bvh;
 pub use clusters::Clusters;
 pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
+pub use faces::FaceOptions;
+pub use grid3::{Grid3, RaySpan};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
 pub use light_grid::{
     CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };
+pub use moving::{MovingAt, MovingGrids, MovingTriangles, Vertices};
+pub use perspective_grids::PerspectiveGrids;
+pub use queries::Candidates;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use receiver_grid::{LightQuery, LitCounts, LitPixels};
 pub use topology::Topology;

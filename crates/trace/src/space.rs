@@ -18,15 +18,52 @@
 
 use glam::DVec3;
 
-use crate::Ray;
+use crate::{Ray, ViewRay};
 
 /// A space in which lines are lines.
 pub trait Space: Copy + Sync {
     /// A world point in this space. Meaningless for points before the near plane of a perspective space.
     fn point(&self, p: DVec3) -> DVec3;
 
+    /// The part with parameters in `range` of the line through a ray that lies within the space's limits; `None` if
+    /// there is none, or if it has no beginning.
+    fn segment(&self, ray: &ViewRay, range: [f64; 2]) -> Option<SpaceRay>;
+
     /// The part of a ray that lies within the space's limits; `None` if there is none.
-    fn ray(&self, ray: &Ray) -> Option<SpaceRay>;
+    fn ray(&self, ray: &Ray) -> Option<SpaceRay> {
+        let range = [f64::from(ray.t_min), f64::from(ray.t_max)];
+        ray.is_valid().then(|| self.segment(&in_f64(ray), range))?
+    }
+
+    /// The smallest and the largest point of this space within its limits.
+    fn limits(&self) -> [DVec3; 2];
+
+    /// A world triangle in this space, without what the space cannot show.
+    fn polygon(&self, corners: [DVec3; 3]) -> Polygon;
+
+    /// The box in this space around the hull of world points; `None` if the space cannot show any of it.
+    fn hull(&self, points: &[DVec3]) -> Option<[DVec3; 2]>;
+
+    /// Bound on the error of points within the limits that come from world coordinates of this magnitude: of a
+    /// point, of a segment's ends, and of an exact hit's place.
+    fn error(&self, magnitude: f64) -> DVec3;
+}
+
+/// Some sixty roundings' worth of relative error.
+const ROUNDING: f64 = f64::from_bits((1023 - 46) << 52);
+
+fn in_f64(ray: &Ray) -> ViewRay {
+    ViewRay {
+        origin: ray.origin.as_dvec3(),
+        dir: ray.dir.as_dvec3(),
+    }
+}
+
+fn bounds(points: impl IntoIterator<Item = DVec3>) -> Option<[DVec3; 2]> {
+    points
+        .into_iter()
+        .map(|p| [p, p])
+        .reduce(|[low, high], [p, _]| [low.min(p), high.max(p)])
 }
 
 /// A ray's segment in a space: points `start + s (end - start)` for s in [0, 1].
@@ -134,11 +171,6 @@ pub struct Orthographic {
 struct Range([f64; 2]);
 
 impl Range {
-    fn of(ray: &Ray) -> Option<Self> {
-        let usable = ray.is_valid() && ray.t_min.is_finite();
-        usable.then_some(Self([f64::from(ray.t_min), f64::from(ray.t_max)]))
-    }
-
     /// Cuts off where `value + t slope` is negative.
     fn cut(&mut self, value: f64, slope: f64) {
         let t = -value / slope;
@@ -151,9 +183,9 @@ impl Range {
         }
     }
 
-    /// The range if anything is left of it.
+    /// The range if anything is left of it and it begins somewhere.
     fn left(self) -> Option<[f64; 2]> {
-        (self.0[0] < self.0[1]).then_some(self.0)
+        (self.0[0] < self.0[1] && self.0[0].is_finite()).then_some(self.0)
     }
 }
 
@@ -162,15 +194,30 @@ impl Space for World {
         p
     }
 
-    fn ray(&self, ray: &Ray) -> Option<SpaceRay> {
-        let (o, d) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        let mut range = Range::of(ray)?;
+    fn segment(&self, &ViewRay { origin: o, dir: d }: &ViewRay, range: [f64; 2]) -> Option<SpaceRay> {
+        let mut range = Range(range);
         for axis in 0..3 {
             range.cut(o[axis] - self.min[axis], d[axis]);
             range.cut(self.max[axis] - o[axis], -d[axis]);
         }
         let range = range.left()?;
         Some(SpaceRay::new(o + d * range[0], o + d * range[1], range, 1.0, 0.0))
+    }
+
+    fn limits(&self) -> [DVec3; 2] {
+        [self.min, self.max]
+    }
+
+    fn polygon(&self, corners: [DVec3; 3]) -> Polygon {
+        Polygon::triangle(corners)
+    }
+
+    fn hull(&self, points: &[DVec3]) -> Option<[DVec3; 2]> {
+        bounds(points.iter().copied())
+    }
+
+    fn error(&self, magnitude: f64) -> DVec3 {
+        DVec3::splat(magnitude * ROUNDING)
     }
 }
 
@@ -202,10 +249,10 @@ impl Perspective {
         self.center + self.right * x + self.up * y + self.forward * depth
     }
 
-    /// The parameters of a ray inside the pyramid.
-    pub fn interval(&self, ray: &Ray) -> Option<[f64; 2]> {
-        let (o, d) = (self.view(ray.origin.as_dvec3()), self.turned(ray.dir.as_dvec3()));
-        let mut range = Range::of(ray)?;
+    /// The parameters in `range` of a ray's line inside the pyramid.
+    pub fn interval(&self, ray: &ViewRay, range: [f64; 2]) -> Option<[f64; 2]> {
+        let (o, d) = (self.view(ray.origin), self.turned(ray.dir));
+        let mut range = Range(range);
         range.cut(o.z - self.near, d.z);
         if self.far.is_finite() {
             range.cut(self.far - o.z, -d.z);
@@ -270,6 +317,13 @@ pub struct Polygon {
 }
 
 impl Polygon {
+    fn triangle([a, b, c]: [DVec3; 3]) -> Self {
+        Self {
+            points: [a, b, c, c],
+            len: 3,
+        }
+    }
+
     fn push(&mut self, p: DVec3) {
         self.points[self.len] = p;
         self.len += 1;
@@ -286,9 +340,9 @@ impl Space for Perspective {
         self.project(self.view(p))
     }
 
-    fn ray(&self, ray: &Ray) -> Option<SpaceRay> {
-        let range = self.interval(ray)?;
-        let (o, d) = (self.view(ray.origin.as_dvec3()), self.turned(ray.dir.as_dvec3()));
+    fn segment(&self, ray: &ViewRay, range: [f64; 2]) -> Option<SpaceRay> {
+        let range = self.interval(ray, range)?;
+        let (o, d) = (self.view(ray.origin), self.turned(ray.dir));
         let start = o + d * range[0];
         // A ray without an end goes to the point at infinity in its direction.
         let end = if range[1].is_finite() {
@@ -297,6 +351,38 @@ impl Space for Perspective {
             DVec3::new(d.x / (d.z * self.tan_x), d.y / (d.z * self.tan_y), 1.0)
         };
         Some(SpaceRay::new(self.project(start), end, range, start.z, d.z))
+    }
+
+    fn limits(&self) -> [DVec3; 2] {
+        [DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE]
+    }
+
+    fn polygon(&self, corners: [DVec3; 3]) -> Polygon {
+        let mut polygon = self.clip_triangle(corners);
+        for point in &mut polygon.points[..polygon.len] {
+            *point = self.project(*point);
+        }
+        polygon
+    }
+
+    fn hull(&self, points: &[DVec3]) -> Option<[DVec3; 2]> {
+        let ahead = |p: &DVec3| p.z >= self.near;
+        let view = points.iter().map(|&p| self.view(p));
+        let cut = view.clone().enumerate().flat_map(|(i, a)| {
+            let others = points[..i].iter().map(|&p| self.view(p));
+            others
+                .filter(move |b| ahead(&a) != ahead(b))
+                .map(move |b| self.at_near(a, b))
+        });
+        bounds(view.clone().filter(ahead).chain(cut).map(|v| self.project(v)))
+    }
+
+    fn error(&self, magnitude: f64) -> DVec3 {
+        // Of view coordinates, then over the smallest depth; 1/near - 1/depth loses the same share, and more where
+        // near and far are close.
+        let view = (magnitude + self.center.abs().max_element()) * ROUNDING / self.near;
+        let depth = view / (self.near * self.inverse_depth_span());
+        DVec3::new(view / self.tan_x, view / self.tan_y, depth)
     }
 }
 
@@ -310,12 +396,9 @@ impl Space for Orthographic {
         )
     }
 
-    fn ray(&self, ray: &Ray) -> Option<SpaceRay> {
-        let (o, d) = (
-            self.turned(ray.origin.as_dvec3() - self.center),
-            self.turned(ray.dir.as_dvec3()),
-        );
-        let mut range = Range::of(ray)?;
+    fn segment(&self, ray: &ViewRay, range: [f64; 2]) -> Option<SpaceRay> {
+        let (o, d) = (self.turned(ray.origin - self.center), self.turned(ray.dir));
+        let mut range = Range(range);
         range.cut(o.z - self.near, d.z);
         range.cut(self.far - o.z, -d.z);
         for (half, o_side, d_side) in [(self.half_x, o.x, d.x), (self.half_y, o.y, d.y)] {
@@ -323,8 +406,29 @@ impl Space for Orthographic {
             range.cut(half + o_side, d_side);
         }
         let range = range.left()?;
-        let world = |t: f64| self.point(ray.origin.as_dvec3() + ray.dir.as_dvec3() * t);
+        let world = |t: f64| self.point(ray.origin + ray.dir * t);
         Some(SpaceRay::new(world(range[0]), world(range[1]), range, 1.0, 0.0))
+    }
+
+    fn limits(&self) -> [DVec3; 2] {
+        [DVec3::new(-1.0, -1.0, 0.0), DVec3::ONE]
+    }
+
+    fn polygon(&self, corners: [DVec3; 3]) -> Polygon {
+        Polygon::triangle(corners.map(|p| self.point(p)))
+    }
+
+    fn hull(&self, points: &[DVec3]) -> Option<[DVec3; 2]> {
+        bounds(points.iter().map(|&p| self.point(p)))
+    }
+
+    fn error(&self, magnitude: f64) -> DVec3 {
+        let view = (magnitude + self.center.abs().max_element()) * ROUNDING;
+        DVec3::new(
+            view / self.half_x,
+            view / self.half_y,
+            view / (self.far - self.near),
+        )
     }
 }
 
@@ -413,15 +517,35 @@ impl Face {
     }
 }
 
-/// The faces a ray passes and its parameters there, by ascending start, equal ones by face.
-///
-/// Together they cover the ray from `near` to `far` (in the largest component of the distance to the center);
-/// where two meet they have the same parameter.
-pub fn face_intervals(center: DVec3, near: f64, far: f64, ray: &Ray) -> Vec<(Face, [f64; 2])> {
-    let mut intervals: Vec<_> = Face::ALL
-        .into_iter()
-        .filter_map(|face| Some((face, face.perspective(center, near, far).interval(ray)?)))
-        .collect();
-    intervals.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
-    intervals
+/// The faces that a ray's line passes, with its parameters there, by ascending start, equal ones by face.
+#[derive(Clone, Copy, Debug)]
+pub struct FaceIntervals {
+    faces: [(Face, [f64; 2]); 6],
+    len: usize,
+}
+
+impl FaceIntervals {
+    /// Of the part of a line with parameters in `range`; `spaces` are those of [`Face::ALL`].
+    ///
+    /// For pyramids of 90 degrees around one center the intervals cover the line from `near` to `far` (in the
+    /// largest component of the distance to the center); where two meet they have the same parameter.
+    pub fn new(spaces: &[Perspective; 6], ray: &ViewRay, range: [f64; 2]) -> Self {
+        let mut intervals = Self {
+            faces: [(Face::PosX, [0.0; 2]); 6],
+            len: 0,
+        };
+        for (face, space) in Face::ALL.into_iter().zip(spaces) {
+            if let Some(interval) = space.interval(ray, range) {
+                intervals.faces[intervals.len] = (face, interval);
+                intervals.len += 1;
+            }
+        }
+        intervals.faces[..intervals.len].sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
+        intervals
+    }
+
+    /// The faces and intervals.
+    pub fn faces(&self) -> &[(Face, [f64; 2])] {
+        &self.faces[..self.len]
+    }
 }

@@ -4,17 +4,66 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use rayward_trace::{Accel, BruteForce, Bvh, Counters, Hit, Light, Ray, Receiver, Topology, Triangles};
+use rayward_trace::{
+    Accel, BruteForce, Bvh, Candidates, Counters, FaceOptions, Grid3, Hit, Light, PerspectiveGrids, Ray,
+    Receiver, Topology, Triangles,
+};
 use support::meshes::{self, Mesh};
 use support::{Random, rays};
 
-/// A row of the table: a structure's name and how to build it.
-type Structure = (&'static str, for<'a> fn(Triangles<'a>) -> Box<dyn Accel + 'a>);
+/// A row of the table: a structure's name, for how many rays a mesh it is tried, and how to build it.
+type Structure = (
+    &'static str,
+    usize,
+    for<'a> fn(Triangles<'a>) -> Box<dyn Accel + 'a>,
+);
 
-const STRUCTURES: [Structure; 2] = [
-    ("BruteForce", |t| Box::new(BruteForce::new(t))),
-    ("Bvh", |t| Box::new(Bvh::build(t))),
+// Brute force against itself only shows that its queries agree with each other.
+const STRUCTURES: [Structure; 9] = [
+    ("BruteForce", 300, |t| Box::new(BruteForce::new(t))),
+    ("Bvh", 3000, |t| Box::new(Bvh::build(t))),
+    ("Grid3 in world", 3000, |t| Box::new(Grid3::in_world(t, None))),
+    ("Grid3 of uneven cells", 600, |t| {
+        Box::new(Grid3::in_world(t, Some([54, 7, 1])))
+    }),
+    ("PerspectiveGrids around a vertex", 3000, |t| {
+        Box::new(PerspectiveGrids::build(
+            some_vertex(&t),
+            t,
+            &FaceOptions::default(),
+        ))
+    }),
+    ("PerspectiveGrids around zero", 600, |t| {
+        let options = FaceOptions {
+            resolution: Some([50, 41, 4]),
+            uniform_depth: true,
+            ..FaceOptions::default()
+        };
+        Box::new(PerspectiveGrids::build(DVec3::ZERO, t, &options))
+    }),
+    ("PerspectiveGrids with a large near cube", 600, |t| {
+        let options = FaceOptions {
+            resolution: Some([16, 16, 9]),
+            near_share: 0.3,
+            ..FaceOptions::default()
+        };
+        Box::new(PerspectiveGrids::build(some_vertex(&t) * 1.5, t, &options))
+    }),
+    ("PerspectiveGrids from far away", 600, |t| {
+        let center = (some_vertex(&t) + DVec3::X) * 300.0;
+        Box::new(PerspectiveGrids::build(center, t, &FaceOptions::default()))
+    }),
+    ("PerspectiveGrids around nowhere", 100, |t| {
+        Box::new(PerspectiveGrids::build(DVec3::NAN, t, &FaceOptions::default()))
+    }),
 ];
+
+/// The first finite vertex, if there is one.
+fn some_vertex(triangles: &Triangles) -> DVec3 {
+    let mut vertices = (0..triangles.x.len() as u32).map(|i| triangles.vertex(i));
+    let vertex = vertices.find(|v| v.is_finite());
+    vertex.map_or(DVec3::ZERO, Vec3::as_dvec3)
+}
 
 fn bits(hit: &Hit) -> [u32; 4] {
     [hit.t.to_bits(), hit.u.to_bits(), hit.v.to_bits(), hit.prim]
@@ -62,10 +111,8 @@ fn all_structures_agree_with_brute_force() {
                 hits
             })
             .collect();
-        for (name, build) in STRUCTURES {
+        for (name, count, build) in STRUCTURES {
             let structure = build(mesh.triangles());
-            // Brute force against itself only shows that its queries agree with each other.
-            let count = if name == "BruteForce" { 300 } else { rays.len() };
             for (i, (ray, truth)) in rays.iter().zip(&truth).enumerate().take(count) {
                 check(name, &*structure, mesh, seed, i, ray, truth);
             }
@@ -125,7 +172,7 @@ fn all_structures_cast_the_same_shadows() {
         let lights = lights(mesh, &mut Random::new(seed));
         let structures = STRUCTURES[1..]
             .iter()
-            .map(|(name, build)| (name, build(mesh.triangles())))
+            .map(|(name, _, build)| (name, build(mesh.triangles())))
             .collect::<Vec<_>>();
         for receiver in &receivers {
             for light in &lights {
@@ -260,8 +307,22 @@ fn building_does_not_depend_on_the_number_of_threads() {
             .build()
             .expect("a pool");
         let bvh = pool.install(|| Bvh::build(mesh.triangles()));
-        let mut work = Counters::default();
-        let hits: Vec<_> = rays.iter().map(|ray| bvh.closest(ray, &mut work)).collect();
+        let world = pool.install(|| Grid3::in_world(mesh.triangles(), None));
+        let center = DVec3::new(0.1, 0.2, 3.0);
+        let options = FaceOptions::default();
+        let faces = pool.install(|| PerspectiveGrids::build(center, mesh.triangles(), &options));
+        // One count for each: the lists are the same, not only the answers.
+        let mut work = [Counters::default(); 3];
+        let hits: Vec<_> = rays
+            .iter()
+            .map(|ray| {
+                [
+                    bvh.closest(ray, &mut work[0]),
+                    world.closest(ray, &mut work[1]),
+                    faces.closest(ray, &mut work[2]),
+                ]
+            })
+            .collect();
         (hits, work)
     };
     let one = with(1);
@@ -273,20 +334,42 @@ fn building_does_not_depend_on_the_number_of_threads() {
 fn traversal_leaves_most_of_the_scene_alone() {
     let mesh = meshes::blob(6);
     let bvh = Bvh::build(mesh.triangles());
+    let world = Grid3::in_world(mesh.triangles(), None);
+    let center = DVec3::new(0.0, 0.5, 2.5);
+    let faces = PerspectiveGrids::build(center, mesh.triangles(), &FaceOptions::default());
     let mut random = Random::new(80);
-    let mut work = Counters::default();
+    let [mut by_bvh, mut by_world, mut by_faces, mut at_home] = [Counters::default(); 4];
     let rays = 2000;
     for _ in 0..rays {
         let from = random.direction().normalize() * 3.0;
-        bvh.closest(&Ray::new(from, random.in_cube() - from), &mut work);
+        let ray = Ray::new(from, random.in_cube() - from);
+        bvh.closest(&ray, &mut by_bvh);
+        world.closest(&ray, &mut by_world);
+        faces.closest(&ray, &mut by_faces);
         // Along an axis: two components are zero.
         let axis = random.below(3);
         let mut from = random.in_cube();
         from[axis] = -3.0;
-        bvh.any(&Ray::new(from, Vec3::AXES[axis]), &mut work);
+        let ray = Ray::new(from, Vec3::AXES[axis]);
+        bvh.any(&ray, &mut by_bvh);
+        world.any(&ray, &mut by_world);
+        faces.any(&ray, &mut by_faces);
+        // Nearly through the center, as from a lens there.
+        let from = center.as_vec3() + random.in_cube() * 0.01;
+        faces.closest(&Ray::new(from, random.in_cube() - from), &mut at_home);
     }
-    assert!(work.nodes < 2 * rays * 40, "{work:?}");
-    assert!(work.triangles < 2 * rays * 40, "{work:?}");
+    for (work, nodes, triangles) in [
+        (by_bvh, 80, 80),
+        (by_world, 160, 80),
+        (by_faces, 400, 800),
+        (at_home, 8, 40),
+    ] {
+        assert!(work.nodes < rays * nodes, "{work:?}, at most {nodes} a ray");
+        assert!(
+            work.triangles < rays * triangles,
+            "{work:?}, at most {triangles} a ray"
+        );
+    }
 }
 
 #[test]

@@ -3,8 +3,8 @@
 mod support;
 
 use glam::{DMat3, DVec3, Vec3};
-use rayward_trace::Ray;
-use rayward_trace::space::{Face, Orthographic, Perspective, Space, World, face_intervals};
+use rayward_trace::space::{Face, FaceIntervals, Orthographic, Perspective, Space, World};
+use rayward_trace::{Ray, ViewRay};
 use support::Random;
 
 fn frame(random: &mut Random) -> [DVec3; 3] {
@@ -248,13 +248,20 @@ fn six_faces_cover_a_ray_but_for_the_near_cube() {
             ray.dir[random.below(3)] = 0.0;
         }
         (ray.t_min, ray.t_max) = (-2.0, 5.0);
-        let intervals = face_intervals(center, near, f64::INFINITY, &ray);
+        let spaces = Face::ALL.map(|face| face.perspective(center, near, f64::INFINITY));
+        let line = ViewRay {
+            origin: ray.origin.as_dvec3(),
+            dir: ray.dir.as_dvec3(),
+        };
+        let intervals = FaceIntervals::new(&spaces, &line, [ray.t_min.into(), ray.t_max.into()]);
+        let intervals = intervals.faces();
         most = most.max(intervals.len());
         assert!(intervals.is_sorted_by(|(_, a), (_, b)| a[0] <= b[0]));
         let at = |t: f64| ray.origin.as_dvec3() + ray.dir.as_dvec3() * t - center;
         let mut last = f64::from(ray.t_min);
         for (face, [t_in, t_out]) in intervals
-            .into_iter()
+            .iter()
+            .copied()
             .chain([(Face::PosX, [f64::from(ray.t_max); 2])])
         {
             if t_in > last {
@@ -284,4 +291,59 @@ fn six_faces_cover_a_ray_but_for_the_near_cube() {
         }
     }
     assert!(through_cube > 500 && most >= 4, "{through_cube} {most}");
+}
+
+/// What a space says of triangles, of hulls and of its own error holds for the points in them.
+fn check_shapes(space: &impl Space, shown: impl Fn(DVec3) -> bool, random: &mut Random) -> usize {
+    let corners = [0; 3].map(|_| random.in_cube().as_dvec3() * 4.0);
+    let (polygon, hull) = (space.polygon(corners), space.hull(&corners));
+    let mut points = 0;
+    for _ in 0..20 {
+        let (u, v) = (f64::from(random.unit()), f64::from(random.unit()));
+        let p = corners[0] * (1.0 - u) + corners[1] * (u * (1.0 - v)) + corners[2] * (u * v);
+        if !shown(p) {
+            continue;
+        }
+        points += 1;
+        let q = space.point(p);
+        let [low, high] = hull.expect("a point of it is shown");
+        let slack = space.error(8.0) * 64.0 + DVec3::splat(1e-12) * q.abs();
+        assert!(
+            q.cmpge(low - slack).all() && q.cmple(high + slack).all(),
+            "{q} {low} {high}"
+        );
+        let by_polygon = polygon
+            .points()
+            .iter()
+            .fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], &p| {
+                [low.min(p), high.max(p)]
+            });
+        assert!(
+            (by_polygon[0] - low).abs().max_element()
+                <= slack.max_element() * low.abs().max_element().max(1.0)
+        );
+        assert!(
+            (by_polygon[1] - high).abs().max_element()
+                <= slack.max_element() * high.abs().max_element().max(1.0)
+        );
+    }
+    points
+}
+
+#[test]
+fn hulls_and_polygons_hold_what_is_shown() {
+    let mut random = Random::new(8);
+    let mut points = 0;
+    for case in 0..2000 {
+        let space = perspective(&mut random, if case % 2 == 0 { 100.0 } else { f64::INFINITY });
+        let shown = |p: DVec3| space.view(p).z >= space.near;
+        points += check_shapes(&space, shown, &mut random);
+        check_shapes(&orthographic(&mut random), |_| true, &mut random);
+        let world = World {
+            min: DVec3::splat(-4.0),
+            max: DVec3::splat(4.0),
+        };
+        check_shapes(&world, |_| true, &mut random);
+    }
+    assert!(points > 10_000, "{points}");
 }
