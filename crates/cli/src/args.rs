@@ -34,6 +34,8 @@ Examples:
   rayward render --builtin forest --time 1.5 --resolution 1280x720 -o forest.png
   rayward render part.stl --up z --scale 0.001 -o part.png
   rayward render city.glb --camera-position 40,30,60 --light sun:1,2,1 -o city.png
+  rayward render --builtin walker --time 0.4 --shutter 0.04 --pixel-samples 32 -o walk.png
+  rayward render --aperture 0.2 --focus 8 -o blurred.png
   rayward render model.glb --layers depth,normal -o model.exr
   rayward render model.glb --npy layers --json > summary.json
   rayward render model.glb -o - | display";
@@ -99,6 +101,16 @@ pub(crate) struct MomentArgs {
     /// Which animation plays, from 0; the first unless given
     #[arg(long, value_name = "INDEX")]
     pub(crate) animation: Option<usize>,
+}
+
+impl MomentArgs {
+    /// The same animation this much later.
+    pub(crate) fn after(&self, seconds: f64) -> Self {
+        Self {
+            time: (f64::from(self.time) + seconds) as f32,
+            animation: self.animation,
+        }
+    }
 }
 
 /// Camera and lights.
@@ -184,6 +196,19 @@ pub(crate) struct PictureArgs {
     /// Linear colour of the light from all around, r,g,b
     #[arg(long, value_name = "COLOR", value_parser = values::color)]
     pub(crate) ambient: Option<Vec3>,
+    /// Eye rays a pixel, whose mean it is; 1, or 16 with a lens or a shutter
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=65536))]
+    pub(crate) pixel_samples: Option<u32>,
+    /// Diameter of the camera's lens: what is not in the plane of focus is blurred. A lens of 50 mm at f/2 has 0.025
+    #[arg(long, value_name = "METRES", value_parser = values::positive)]
+    pub(crate) aperture: Option<f64>,
+    /// Distance of the plane of focus along the view; to the middle of the scene unless given
+    #[arg(long, value_name = "METRES", value_parser = values::positive, requires = "aperture")]
+    pub(crate) focus: Option<f64>,
+    /// How long the shutter is open from the moment of --time on, in which things move on straight lines; lights
+    /// stand still
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive)]
+    pub(crate) shutter: Option<f64>,
     /// The literal parameters of Hunt and Mark 2008: 100x100 tiles, 200x200 light grids, binning by bounding
     /// rectangle, back faces alone as casters
     #[arg(long)]

@@ -2,11 +2,12 @@
 
 use std::time::Instant;
 
-use rayward::{RenderOptions, Renderer};
+use rayward::scene::{FrameGeometry, PosedCamera};
+use rayward::{Lens, RenderOptions, Renderer, Shutter};
 
 use crate::args::{PictureArgs, RenderArgs};
 use crate::failure::{Code, Failure};
-use crate::input::Input;
+use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
 use crate::progress::Bar;
@@ -55,7 +56,23 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let prepare = prepare_start.elapsed();
     bar.phase("rendering");
     let show = |progress| bar.show(progress);
-    let rendered = renderer.render(&frame, &view.camera, &view.lights, &options, &show)?;
+    let options = RenderOptions {
+        lens: lens(&args.picture, &view.camera, &frame),
+        ..options
+    };
+    let rendered = match args.picture.shutter {
+        None => renderer.render(&frame, &view.camera, &view.lights, &options, &show)?,
+        Some(seconds) => {
+            let moment = args.moment.after(seconds);
+            let frame_close = input.pose(&moment)?;
+            let close = View::choose(&args.view, &input, &frame_close, aspect)?;
+            let shutter = Shutter {
+                geometry: &frame_close,
+                camera: &close.camera,
+            };
+            renderer.render_shutter(&frame, &view.camera, shutter, &view.lights, &options, &show)?
+        }
+    };
     bar.phase("writing");
     let write_start = Instant::now();
     let files = targets.write(&rendered.film)?;
@@ -113,9 +130,19 @@ fn check_memory(options: &RenderOptions) -> Result<(), Failure> {
     }
 }
 
+/// The lens asked for, focused on the middle of the scene if on nothing else.
+fn lens(args: &PictureArgs, camera: &PosedCamera, frame: &FrameGeometry) -> Option<Lens> {
+    let middle = || (input::center(frame) - camera.eye).dot(camera.forward);
+    args.aperture.map(|diameter| Lens {
+        radius: 0.5 * diameter,
+        focus: args.focus.unwrap_or_else(middle),
+    })
+}
+
 fn options(args: &PictureArgs) -> RenderOptions {
     let defaults = RenderOptions::default();
     let size = size(args, &defaults);
+    let spread = args.aperture.is_some() || args.shutter.is_some();
     RenderOptions {
         width: size.width,
         height: size.height,
@@ -123,6 +150,7 @@ fn options(args: &PictureArgs) -> RenderOptions {
         casters: args.casters.into(),
         ambient: args.ambient.unwrap_or(defaults.ambient),
         background: args.background.unwrap_or(defaults.background),
+        pixel_samples: args.pixel_samples.unwrap_or(if spread { 16 } else { 1 }),
         paper: args.paper,
         ..defaults
     }

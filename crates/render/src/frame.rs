@@ -9,6 +9,7 @@ use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
 use rayward_trace::{Clusters, Light, Topology, View};
 
 use crate::casters::{CasterRules, triangles};
+use crate::distributed::{self, Shutter};
 use crate::plan::FramePlan;
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
@@ -66,6 +67,10 @@ impl<'s> Renderer<'s> {
         options: &RenderOptions,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<RenderedFrame> {
+        if options.pixel_samples > 1 || options.lens.is_some() {
+            let still = Shutter { geometry, camera };
+            return self.render_shutter(geometry, camera, still, lights, options, progress);
+        }
         let camera = CameraFrame::new(camera, geometry.origin, options.width, options.height)?;
         let mut film = Film::new(options.width, options.height, options.layers)?;
         let view = view(&camera, geometry);
@@ -126,6 +131,34 @@ impl<'s> Renderer<'s> {
             trace: start.elapsed(),
         };
         Ok(RenderedFrame { film, stats })
+    }
+
+    /// As [`Self::render`], with a shutter that is open from the time of `geometry` and `camera` to that of `shutter`:
+    /// what moves is blurred. Lights stand still. Each pixel is the mean of [`RenderOptions::pixel_samples`] rays.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    ///
+    /// # Panics
+    /// If one of the two geometries is not of the renderer's scene.
+    pub fn render_shutter(
+        &mut self,
+        geometry: &FrameGeometry,
+        camera: &PosedCamera,
+        shutter: Shutter,
+        lights: &[PosedLight],
+        options: &RenderOptions,
+        progress: &(dyn Fn(Progress) + Sync),
+    ) -> Result<RenderedFrame> {
+        let opening = (geometry, camera);
+        distributed::render(
+            (self.scene, &self.shader),
+            opening,
+            shutter,
+            lights,
+            options,
+            progress,
+        )
     }
 
     /// Finds the components and clusters anew only where the triangles are others than in the last frame.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayward_trace::SimdLevel;
 
-use crate::Layers;
+use crate::{Layers, Lens};
 
 /// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with hard shadows.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +20,11 @@ pub struct RenderOptions {
     pub ambient: Vec3,
     /// Radiance where no surface is seen.
     pub background: Vec3,
+    /// Eye rays a pixel. More than one, a lens or a shutter make a frame of distributed rays, see
+    /// [`crate::Renderer::render_shutter`]; their mean is the pixel.
+    pub pixel_samples: u32,
+    /// The lens of the camera; `None` is a pinhole, before which all is sharp.
+    pub lens: Option<Lens>,
     /// Layers to keep besides the colour.
     pub layers: Layers,
     /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
@@ -38,6 +43,8 @@ impl Default for RenderOptions {
             casters: CasterPolicy::Auto,
             ambient: Vec3::splat(0.1),
             background: Vec3::new(0.44, 0.54, 0.68),
+            pixel_samples: 1,
+            lens: None,
             layers: Layers::default(),
             paper: false,
             level: SimdLevel::detect(),

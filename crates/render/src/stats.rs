@@ -13,7 +13,7 @@ pub struct FrameStats {
     pub dropped_degenerate: usize,
     /// The structures built for this frame.
     pub structures: Vec<StructureStats>,
-    /// Eye rays traced: one a pixel.
+    /// Eye rays traced: one a pixel, or as many as were asked for.
     pub eye_rays: u64,
     /// Shadow rays asked for: one for each pixel and light whose surface faces the light.
     pub shadow_rays: u64,
