@@ -170,3 +170,48 @@ pub fn blocks(corners: [Vec3; 3], receiver: &Receiver, light: &Light) -> bool {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_meshes::Numbers;
+
+    type Whole = [i128; 3];
+
+    fn volume_of(a: Whole, b: Whole, c: Whole) -> i128 {
+        let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+        a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)
+    }
+
+    /// Rays that all but lie in large triangles, in whole numbers: what is left of 60 bits is a few.
+    #[test]
+    fn t_is_right_where_cancellation_leaves_nothing() {
+        let mut numbers = Numbers(11);
+        let mut whole = |size: f32| [(); 3].map(|()| (numbers.next() * size).round() as i128);
+        let (mut hits, mut in_plane) = (0, 0);
+        for _ in 0..40_000 {
+            let [a, b, c, share, off, lean] = [4e6, 4e6, 4e6, 3.0, 1.2, 1.2].map(&mut whole);
+            let at = |i: usize, s: i128, t: i128| a[i] + (b[i] - a[i]) * s + (c[i] - a[i]) * t;
+            let origin: Whole = std::array::from_fn(|i| at(i, share[0], share[1]) + off[i]);
+            let target: Whole = std::array::from_fn(|i| (a[i] + b[i] + c[i]) / 3 + lean[i]);
+            let from_origin = |p: Whole| -> Whole { std::array::from_fn(|i| p[i] - origin[i]) };
+            let vector = |p: Whole| DVec3::from_array(p.map(|v| v as f64));
+            let corners = [a, b, c].map(|p| vector(p).as_vec3());
+            let dir = from_origin(target);
+            let Some(hit) = hit(vector(origin), vector(dir), corners) else {
+                continue;
+            };
+            hits += 1;
+            let [a0, a1, a2] = [a, b, c].map(from_origin);
+            let steepness = volume_of(dir, a1, a2) + volume_of(dir, a2, a0) + volume_of(dir, a0, a1);
+            let height = volume_of(a0, a1, a2);
+            in_plane += usize::from(height == 0);
+            let t = height as f64 / steepness as f64;
+            assert!(
+                (hit.t - t).abs() <= t.abs() * 2f64.powi(-22),
+                "{hit:?}, t should be {t}"
+            );
+        }
+        assert!(hits > 3000 && in_plane > 20, "{hits} {in_plane}");
+    }
+}

@@ -269,3 +269,39 @@ fn files_are_turned_and_scaled() {
         .run(&["info", "--builtin", "walker", "--up", "z"])
         .expect(2);
 }
+
+#[test]
+fn a_lens_and_a_shutter() {
+    let folder = Folder::new();
+    let lens = [
+        "--aperture",
+        "0.3",
+        "--pixel-samples",
+        "2",
+        "--json",
+        "-o",
+        "lens.png",
+    ];
+    let json = folder.run(&small(&lens)).expect(0).json();
+    assert_eq!(json["eye_rays"], 2 * 64 * 48);
+    let shutter = [
+        "--builtin",
+        "walker",
+        "--resolution",
+        "32x24",
+        "--time",
+        "0.4",
+        "--shutter",
+        "0.05",
+        "--json",
+    ];
+    let json = folder.run(&[&["render"], &shutter[..]].concat()).expect(0).json();
+    assert_eq!(
+        json["eye_rays"],
+        16 * 32 * 24,
+        "16 rays a pixel unless told otherwise"
+    );
+    let refused = folder.run(&small(&["--focus", "3"])).expect(2);
+    assert!(refused.stderr.contains("--aperture"), "{}", refused.stderr);
+    folder.run(&small(&["--aperture", "0"])).expect(2);
+}
