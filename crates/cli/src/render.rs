@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use rayward::scene::{FrameGeometry, PosedCamera};
-use rayward::{Lens, RenderOptions, Renderer, Shutter};
+use rayward::{Lens, Progress, RenderOptions, RenderedFrame, Renderer, Shutter};
 
 use crate::args::{PictureArgs, RenderArgs};
 use crate::failure::{Code, Failure};
@@ -60,19 +60,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         lens: lens(&args.picture, &view.camera, &frame),
         ..options
     };
-    let rendered = match args.picture.shutter {
-        None => renderer.render(&frame, &view.camera, &view.lights, &options, &show)?,
-        Some(seconds) => {
-            let moment = args.moment.after(seconds);
-            let frame_close = input.pose(&moment)?;
-            let close = View::choose(&args.view, &input, &frame_close, aspect)?;
-            let shutter = Shutter {
-                geometry: &frame_close,
-                camera: &close.camera,
-            };
-            renderer.render_shutter(&frame, &view.camera, shutter, &view.lights, &options, &show)?
-        }
-    };
+    let rendered = picture(args, &input, &mut renderer, (&frame, &view), &options, &show)?;
     bar.phase("writing");
     let write_start = Instant::now();
     let files = targets.write(&rendered.film)?;
@@ -104,6 +92,28 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         report::note(&summary.text());
         Ok(())
     }
+}
+
+/// The picture of a frame, with what has moved when the shutter closes if there is one.
+fn picture(
+    args: &RenderArgs,
+    input: &Input,
+    renderer: &mut Renderer,
+    (frame, view): (&FrameGeometry, &View),
+    options: &RenderOptions,
+    show: &(dyn Fn(Progress) + Sync),
+) -> Result<RenderedFrame, Failure> {
+    let Some(seconds) = args.picture.shutter else {
+        return Ok(renderer.render(frame, &view.camera, &view.lights, options, show)?);
+    };
+    let close = input.pose(&args.moment.after(seconds))?;
+    let aspect = f64::from(options.width) / f64::from(options.height);
+    let camera = View::choose(&args.view, input, &close, aspect)?.camera;
+    let shutter = Shutter {
+        geometry: &close,
+        camera: &camera,
+    };
+    Ok(renderer.render_shutter(frame, &view.camera, shutter, &view.lights, options, show)?)
 }
 
 /// A picture that cannot fit is an error now instead of a killed process later.
