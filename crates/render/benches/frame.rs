@@ -12,12 +12,12 @@ use std::sync::Mutex;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use rayward::CameraFrame;
-use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
+use rayward::scene::{self, FrameGeometry, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
     Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions, LightQuery, LitPixels, PointLightGrid,
-    Receiver, ShadowScratch, SimdLevel, TileHits, Triangles, View, Visibility, exact,
+    Receiver, ShadowScratch, SimdLevel, TileHits, View, Visibility, exact,
 };
+use rayward::{CameraFrame, shadow_end, triangles};
 
 fn main() {
     rayon::ThreadPoolBuilder::new()
@@ -109,21 +109,7 @@ fn load(name: &str) -> Frame {
 fn view(frame: &Frame) -> View {
     let (width, height) = if is_test() { (96, 60) } else { (1920, 1200) };
     let camera = CameraFrame::new(&frame.camera, frame.geometry.origin, width, height).expect("valid");
-    let half = [
-        camera.step_x.length() * f64::from(width),
-        camera.step_y.length() * f64::from(height),
-    ];
-    let axes = [camera.right, camera.up, camera.forward];
-    View::perspective(camera.eye, axes, half.map(|v| v * 0.5), [width, height])
-}
-
-fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
-    Triangles {
-        x: &geometry.x,
-        y: &geometry.y,
-        z: &geometry.z,
-        indices: &geometry.indices,
-    }
+    camera.view(&frame.geometry)
 }
 
 /// Closest triangles of all pixels, given to `see` tile by tile as receivers.
@@ -172,20 +158,12 @@ fn eye(bencher: Bencher, name: &str) {
     });
 }
 
-/// Where shadow rays end.
-fn light_of(frame: &Frame) -> Light {
-    match frame.light.kind {
-        LightKind::Directional { .. } => Light::Directional((-frame.light.direction).as_vec3()),
-        _ => Light::Point((frame.light.position - frame.geometry.origin).as_vec3()),
-    }
-}
-
 #[divan::bench(args = scenes())]
 fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
     with_frame(name, |frame| {
         let (view, triangles) = (view(frame), triangles(&frame.geometry));
         let query = LightQuery {
-            light: light_of(frame),
+            light: shadow_end(&frame.light, frame.geometry.origin),
             cone: None,
             eye: Light::Point(view.center),
             rule: &|_| Casts::Both,
@@ -209,7 +187,7 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
 #[divan::bench(args = scenes())]
 fn eye_and_looked_up_shadows(bencher: Bencher, name: &str) {
     with_frame(name, |frame| {
-        let light = light_of(frame);
+        let light = shadow_end(&frame.light, frame.geometry.origin);
         let (mut asked, view) = (0, view(frame));
         trace(frame, |receivers| asked += receivers.len());
         let rays = (view.width * view.height) as usize + asked;

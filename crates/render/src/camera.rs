@@ -1,28 +1,19 @@
-//! From a posed camera and a resolution to the rays of its pixels.
+//! From a posed camera and a resolution to the view whose raster points are the pixels' rays.
 //!
 //! Conventions: right-handed; pixel (0, 0) is the top left one, its centre at (0.5, 0.5); pixels are square, the
 //! vertical field of view governs and the aspect is width over height, whatever a file prescribes.
 //!
 //! The eye is rounded once to f32 in the local frame (relative to [`rayward_scene::FrameGeometry::origin`]): the
-//! rounded eye *is* the camera of the picture, for every structure alike. Directions stay in f64 and have a
-//! component of exactly 1 along the view direction, so that the parameter of a hit is its view depth:
-//!
-//! ```text
-//! perspective   origin = eye                             direction = offset(x, y), offset . forward = 1
-//! orthographic  origin = eye + offset(x, y)              direction = forward,      offset . forward = 0
-//!               offset(x, y) = corner + x * step_x + y * step_y
-//! ```
-//!
-//! Limits: an orthographic origin is rounded to f32 per ray.
+//! rounded eye *is* the camera of the picture, for every structure alike. Axes stay in f64, see [`View`].
 
 use glam::{DVec3, Vec3};
-use rayward_scene::{PosedCamera, Projection};
-use rayward_trace::Ray;
+use rayward_scene::{FrameGeometry, PosedCamera, Projection};
+use rayward_trace::{Light, View};
 
 use crate::error::check_size;
 use crate::{Error, Result};
 
-/// A camera ready to generate rays in the local frame of one frame's geometry.
+/// A camera in the local frame of one frame's geometry, for pictures of one size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFrame {
     /// Width of the picture in pixels.
@@ -37,18 +28,14 @@ pub struct CameraFrame {
     pub right: DVec3,
     /// Unit vector to the top of the picture.
     pub up: DVec3,
-    /// Offset of the picture's top left corner. Metres for an orthographic camera.
-    pub corner: DVec3,
-    /// Change of the offset over one pixel to the right.
-    pub step_x: DVec3,
-    /// Change of the offset over one pixel down.
-    pub step_y: DVec3,
+    /// Half the width and half the height of the picture at a depth of 1; metres for an orthographic camera.
+    pub half: [f64; 2],
     /// Whether the projection is parallel.
     pub orthographic: bool,
 }
 
 impl CameraFrame {
-    /// The camera's rays for a picture of this size, relative to `origin`.
+    /// The camera for a picture of this size, relative to `origin`.
     ///
     /// # Errors
     /// [`Error::ImageSize`] without pixels; [`Error::Camera`] if position, axes or lens are not finite, the axes
@@ -90,7 +77,6 @@ impl CameraFrame {
         let up = right.cross(forward);
 
         let half_width = half_height * f64::from(width) / f64::from(height);
-        let ahead = if orthographic { DVec3::ZERO } else { forward };
         Ok(Self {
             width,
             height,
@@ -98,40 +84,40 @@ impl CameraFrame {
             forward,
             right,
             up,
-            corner: ahead - right * half_width + up * half_height,
-            step_x: right * (2.0 * half_width / f64::from(width)),
-            step_y: up * (-2.0 * half_height / f64::from(height)),
+            half: [half_width, half_height],
             orthographic,
         })
     }
 
-    /// Offset of a point of the picture; (x + 0.5, y + 0.5) is the centre of pixel (x, y).
-    #[inline]
-    pub fn offset(&self, x: f64, y: f64) -> DVec3 {
-        self.corner + self.step_x * x + self.step_y * y
-    }
-
-    /// The ray through a point of the picture, see [`Self::offset`]; its parameter is the view depth in metres.
-    #[inline]
-    pub fn ray(&self, x: f64, y: f64) -> Ray {
-        let offset = self.offset(x, y);
-        if self.orthographic {
-            Ray::new((self.eye.as_dvec3() + offset).as_vec3(), self.forward.as_vec3())
-        } else {
-            Ray::new(self.eye, offset.as_vec3())
+    /// The camera's rays as the structures know them. An orthographic view has to know the depths that occur in
+    /// `geometry`.
+    pub fn view(&self, geometry: &FrameGeometry) -> View {
+        let axes = [self.right, self.up, self.forward];
+        let size = [self.width, self.height];
+        if !self.orthographic {
+            return View::perspective(self.eye, axes, self.half, size);
         }
+        let farthest = geometry.bounds().map_or(1.0, |(low, high)| {
+            let eye = self.eye.as_dvec3();
+            let corner = |p: Vec3| -> DVec3 { (p.as_dvec3() - eye).abs() };
+            corner(low).max(corner(high)).length()
+        });
+        View::parallel(self.eye, axes, self.half, 4.0 * farthest.max(1e-30), size)
     }
 
-    /// The ray through the centre of a pixel.
-    #[inline]
-    pub fn pixel_ray(&self, x: u32, y: u32) -> Ray {
-        self.ray(f64::from(x) + 0.5, f64::from(y) + 0.5)
+    /// Where the eye rays come from, as a light that would light what they see.
+    pub fn vantage(&self) -> Light {
+        if self.orthographic {
+            Light::Directional((-self.forward).as_vec3())
+        } else {
+            Light::Point(self.eye)
+        }
     }
 
     /// Width of a pixel, in metres, at this view depth: the footprint by which textures are filtered.
     #[inline]
     pub fn footprint(&self, depth: f32) -> f32 {
-        let step = self.step_y.length() as f32;
+        let step = (2.0 * self.half[1] / f64::from(self.height)) as f32;
         if self.orthographic { step } else { step * depth }
     }
 }
@@ -160,10 +146,11 @@ mod tests {
         let frame = CameraFrame::new(&camera(PERSPECTIVE), DVec3::new(1e6, 0.0, 0.0), 8, 4).unwrap();
         assert_eq!(frame.eye, Vec3::new(1.0, 2.0, 3.0));
         // 90 degrees vertically, aspect 2: the picture spans [-2, 2] x [-1, 1] at depth 1.
-        let top_left = frame.pixel_ray(0, 0);
-        assert!((top_left.dir - Vec3::new(-1.75, 0.75, -1.0)).length() < 1e-6);
-        let bottom_right = frame.pixel_ray(7, 3);
-        assert!((bottom_right.dir - Vec3::new(1.75, -0.75, -1.0)).length() < 1e-6);
+        let view = frame.view(&FrameGeometry::default());
+        let [top_left, bottom_right] = [view.pixel_ray(0, 0), view.pixel_ray(7, 3)];
+        assert_eq!(top_left.origin, DVec3::new(1.0, 2.0, 3.0));
+        assert!((top_left.dir - DVec3::new(-1.75, 0.75, -1.0)).length() < 1e-12);
+        assert!((bottom_right.dir - DVec3::new(1.75, -0.75, -1.0)).length() < 1e-12);
         assert!((frame.footprint(2.0) - 1.0).abs() < 1e-6);
     }
 
@@ -174,9 +161,9 @@ mod tests {
             aspect: None,
         };
         let frame = CameraFrame::new(&camera(lens), DVec3::new(1e6, 0.0, 0.0), 4, 4).unwrap();
-        let ray = frame.pixel_ray(0, 3);
-        assert_eq!(ray.dir, Vec3::NEG_Z);
-        assert!((ray.origin - Vec3::new(-0.5, 0.5, 3.0)).length() < 1e-6);
+        let ray = frame.view(&FrameGeometry::default()).pixel_ray(0, 3);
+        assert_eq!(ray.dir, DVec3::NEG_Z);
+        assert!((ray.origin - DVec3::new(-0.5, 0.5, 3.0)).length() < 1e-12);
         assert!((frame.footprint(100.0) - 1.0).abs() < 1e-6);
     }
 
@@ -190,7 +177,8 @@ mod tests {
             (frame.right.cross(frame.up) + frame.forward).length() < 1e-12,
             "right-handed"
         );
-        assert!((frame.offset(1.3, 0.2).dot(frame.forward) - 1.0).abs() < 1e-12);
+        let ray = frame.view(&FrameGeometry::default()).ray(1.3, 0.2);
+        assert!((ray.dir.dot(frame.forward) - 1.0).abs() < 1e-12);
     }
 
     #[test]

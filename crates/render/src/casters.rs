@@ -7,9 +7,10 @@
 
 use glam::DVec3;
 use rayward_scene::{AlphaMode, FrameGeometry, Scene};
-use rayward_trace::{Casts, Light, Topology, Triangles};
+use rayward_trace::{Casts, Light, Topology};
 
 use crate::CasterPolicy;
+use crate::geometry::triangles;
 
 /// Per component, whether the eye is outside; per triangle, whether it is opaque.
 #[derive(Clone, Debug)]
@@ -85,16 +86,6 @@ impl<'t> CasterRules<'t> {
                 CasterPolicy::Auto => Casts::Both,
             }
         }
-    }
-}
-
-/// The frame's triangles as the structures take them.
-pub(crate) fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
-    Triangles {
-        x: &geometry.x,
-        y: &geometry.y,
-        z: &geometry.z,
-        indices: &geometry.indices,
     }
 }
 

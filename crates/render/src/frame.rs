@@ -3,13 +3,13 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use glam::DVec3;
 use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
-use rayward_trace::{Clusters, Light, Topology, View};
+use rayward_trace::{Clusters, Topology};
 
-use crate::casters::{CasterRules, triangles};
+use crate::casters::CasterRules;
 use crate::distributed::{self, Shutter};
+use crate::geometry::triangles;
 use crate::plan::FramePlan;
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
@@ -73,7 +73,7 @@ impl<'s> Renderer<'s> {
         }
         let camera = CameraFrame::new(camera, geometry.origin, options.width, options.height)?;
         let mut film = Film::new(options.width, options.height, options.layers)?;
-        let view = view(&camera, geometry);
+        let view = camera.view(geometry);
         let start = Instant::now();
         self.update_topology(geometry);
         let (_, topology, clusters) = self.topology.as_ref().expect("just updated");
@@ -81,7 +81,7 @@ impl<'s> Renderer<'s> {
         let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
 
         let plan = FramePlan::new(geometry, lights, options);
-        let eye = eye_of(&camera);
+        let eye = camera.vantage();
         let structures = FrameStructures::build(&plan, view, geometry, clusters, &rules, eye, options);
         let build = start.elapsed();
 
@@ -97,7 +97,7 @@ impl<'s> Renderer<'s> {
             lights: &shading_lights,
             ends: &plan.lights,
             structures: &structures,
-            eye: eye_of(&camera),
+            eye: camera.vantage(),
             options,
         };
         let side = structures.eye.tile_side();
@@ -175,32 +175,4 @@ impl<'s> Renderer<'s> {
             }
         }
     }
-}
-
-/// Where the eye rays come from, as the one whose side of a triangle is seen.
-fn eye_of(camera: &CameraFrame) -> Light {
-    if camera.orthographic {
-        Light::Directional((-camera.forward).as_vec3())
-    } else {
-        Light::Point(camera.eye)
-    }
-}
-
-/// The camera's rays as the structures know them.
-fn view(camera: &CameraFrame, geometry: &FrameGeometry) -> View {
-    let axes = [camera.right, camera.up, camera.forward];
-    let size = [camera.width, camera.height];
-    let half = [
-        camera.step_x.length() * 0.5 * f64::from(camera.width),
-        camera.step_y.length() * 0.5 * f64::from(camera.height),
-    ];
-    if !camera.orthographic {
-        return View::perspective(camera.eye, axes, half, size);
-    }
-    let farthest = geometry.bounds().map_or(1.0, |(low, high)| {
-        let eye = camera.eye.as_dvec3();
-        let corner = |p: glam::Vec3| -> DVec3 { (p.as_dvec3() - eye).abs() };
-        corner(low).max(corner(high)).length()
-    });
-    View::parallel(camera.eye, axes, half, 4.0 * farthest.max(1e-30), size)
 }

@@ -12,6 +12,7 @@ use rayward_scene::{FrameGeometry, LightKind, PosedLight};
 use rayward_trace::{Cone, EyeGridOptions, Light, LightGridOptions};
 
 use crate::RenderOptions;
+use crate::geometry::shadow_end;
 
 /// The structures of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,13 +69,5 @@ impl FramePlan {
             .map(|light| options.shadows.then(|| plan(light)))
             .collect();
         Self { eye, lights }
-    }
-}
-
-/// Where a light's shadow rays end, in the local frame.
-fn shadow_end(light: &PosedLight, origin: DVec3) -> Light {
-    match light.kind {
-        LightKind::Directional { .. } => Light::Directional((-light.direction).as_vec3()),
-        _ => Light::Point((light.position - origin).as_vec3()),
     }
 }

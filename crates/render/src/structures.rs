@@ -5,7 +5,8 @@ use std::time::Instant;
 use rayward_scene::FrameGeometry;
 use rayward_trace::{Bvh, Clusters, EyeGrid, Light, LightQuery, LitPixels, PointLightGrid, Tile, View, Visibility};
 
-use crate::casters::{CasterRules, triangles};
+use crate::casters::CasterRules;
+use crate::geometry::triangles;
 use crate::plan::FramePlan;
 use crate::tile::TileCounts;
 use crate::{RenderOptions, StructureStats};

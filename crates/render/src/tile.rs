@@ -7,7 +7,7 @@ use glam::{Vec2, Vec3};
 use rayward_scene::FrameGeometry;
 use rayward_trace::{Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay, exact};
 
-use crate::casters::triangles;
+use crate::geometry::triangles;
 use crate::plan::LightPlan;
 use crate::shade::{ambient, direct, object_of};
 use crate::structures::{FrameStructures, LightShadows};

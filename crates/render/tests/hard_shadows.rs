@@ -4,15 +4,11 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use rayward::scene::{FrameGeometry, LightKind, PosedCamera, PosedLight, Scene, builtin};
 use rayward::shade::{ambient, direct, object_of};
-use rayward::trace::{Accel, BruteForce, Light, Receiver, SimdLevel, Triangles, View, exact};
+use rayward::trace::{Accel, BruteForce, Light, Receiver, SimdLevel, Triangles, exact};
 use rayward::{
     CameraFrame, CasterPolicy, Film, Layers, NO_ID, RenderOptions, Renderer, Shader, ShadingLight,
-    SurfacePoint,
+    SurfacePoint, shadow_end, triangles,
 };
-
-fn triangles(geometry: &FrameGeometry) -> Triangles<'_> {
-    Triangles::new(&geometry.x, &geometry.y, &geometry.z, &geometry.indices)
-}
 
 /// The closest triangle on a ray whose direction is f64, by testing all.
 fn closest(triangles: &Triangles, origin: DVec3, dir: DVec3) -> Option<(u32, f64)> {
@@ -32,12 +28,7 @@ fn reference_pixel(
     [x, y]: [u32; 2],
 ) -> (Vec3, u32) {
     let triangles = triangles(geometry);
-    let half = [
-        camera.step_x.length() * 0.5 * f64::from(camera.width),
-        camera.step_y.length() * 0.5 * f64::from(camera.height),
-    ];
-    let axes = [camera.right, camera.up, camera.forward];
-    let ray = View::perspective(camera.eye, axes, half, [camera.width, camera.height]).pixel_ray(x, y);
+    let ray = camera.view(geometry).pixel_ray(x, y);
     let Some((prim, t)) = closest(&triangles, ray.origin, ray.dir) else {
         return (options.background, NO_ID);
     };
@@ -58,10 +49,7 @@ fn reference_pixel(
         let Some(incident) = direct(&surface, &ShadingLight::new(light, geometry.origin)) else {
             continue;
         };
-        let end = match light.kind {
-            LightKind::Directional { .. } => Light::Directional((-light.direction).as_vec3()),
-            _ => Light::Point((light.position - geometry.origin).as_vec3()),
-        };
+        let end = shadow_end(light, geometry.origin);
         let lit = exact::side(triangles.corners(prim), &end);
         let same_side = (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0);
         if same_side && !BruteForce::new(triangles).shadowed(&receiver, &end) {

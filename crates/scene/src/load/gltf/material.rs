@@ -94,23 +94,19 @@ fn core_material(
         ..Material::default()
     };
     if let Some(normal) = &material.normal_texture {
-        let transform = textures.transform(normal.extensions.as_ref().map(|e| &e.others), place)?;
-        let texture = Use {
-            index: normal.index,
-            uv_set: normal.tex_coord,
-            transform: transform.as_ref(),
-        };
-        out.normal_texture = textures.texture(texture, Derivation::None, place, "normalTexture")?;
+        let others = normal.extensions.as_ref().map(|e| &e.others);
+        out.normal_texture = textures.bare(normal.index, normal.tex_coord, others, place, "normalTexture")?;
         out.normal_scale = normal.scale;
     }
     if let Some(occlusion) = &material.occlusion_texture {
-        let transform = textures.transform(occlusion.extensions.as_ref().map(|e| &e.others), place)?;
-        let texture = Use {
-            index: occlusion.index,
-            uv_set: occlusion.tex_coord,
-            transform: transform.as_ref(),
-        };
-        out.occlusion_texture = textures.texture(texture, Derivation::None, place, "occlusionTexture")?;
+        let others = occlusion.extensions.as_ref().map(|e| &e.others);
+        out.occlusion_texture = textures.bare(
+            occlusion.index,
+            occlusion.tex_coord,
+            others,
+            place,
+            "occlusionTexture",
+        )?;
         out.occlusion_strength = occlusion.strength.0.clamp(0.0, 1.0);
     }
     Ok(out)
@@ -183,17 +179,8 @@ fn specular_glossiness(
     let texture = glossy.specular_glossiness_texture.as_ref();
     out.specular_color_texture = textures.info(texture, place, name)?;
     if let Some(info) = texture {
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|e| e.texture_transform.as_ref());
-        let texture = Use {
-            index: info.index,
-            uv_set: info.tex_coord,
-            transform,
-        };
         let derivation = Derivation::roughness(glossiness);
-        out.metallic_roughness_texture = textures.texture(texture, derivation, place, name)?;
+        out.metallic_roughness_texture = textures.texture(Use::of(info), derivation, place, name)?;
         if out.metallic_roughness_texture.is_some() {
             out.roughness = 1.0;
         }
@@ -212,6 +199,17 @@ struct Use<'a> {
     transform: Option<&'a FileTransform>,
 }
 
+impl<'a> Use<'a> {
+    fn of(info: &'a Info) -> Self {
+        let extensions = info.extensions.as_ref();
+        Self {
+            index: info.index,
+            uv_set: info.tex_coord,
+            transform: extensions.and_then(|e| e.texture_transform.as_ref()),
+        }
+    }
+}
+
 /// Resolves textures and collects the images that are needed.
 struct Textures<'a> {
     source: &'a Source<'a>,
@@ -223,14 +221,23 @@ struct Textures<'a> {
 impl Textures<'_> {
     fn info(&mut self, info: Option<&Info>, place: &str, name: &str) -> Result<Option<TextureRef>, Error> {
         let Some(info) = info else { return Ok(None) };
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|e| e.texture_transform.as_ref());
+        self.texture(Use::of(info), Derivation::None, place, name)
+    }
+
+    /// A texture whose extensions the model of the `gltf` crate has only as JSON.
+    fn bare(
+        &mut self,
+        index: json::Index<json::Texture>,
+        uv_set: u32,
+        extensions: Option<&serde_json::Map<String, json::Value>>,
+        place: &str,
+        name: &str,
+    ) -> Result<Option<TextureRef>, Error> {
+        let transform = self.transform(extensions, place)?;
         let texture = Use {
-            index: info.index,
-            uv_set: info.tex_coord,
-            transform,
+            index,
+            uv_set,
+            transform: transform.as_ref(),
         };
         self.texture(texture, Derivation::None, place, name)
     }
