@@ -29,7 +29,9 @@ fn gltf_files(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn scenes_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("RAYWARD_SCENES").map(PathBuf::from);
+    let folder = std::env::var_os("RAYWARD_SCENES")
+        .filter(|value| !value.is_empty())
+        .map(PathBuf::from);
     if folder.is_none() {
         println!("skipped: RAYWARD_SCENES is not set");
     }

@@ -22,7 +22,7 @@ fn files(folder: &Path, into: &mut Vec<PathBuf>) {
 }
 
 fn scene_files(folders: &[&str]) -> Option<Vec<PathBuf>> {
-    let Some(root) = std::env::var_os("RAYWARD_SCENES") else {
+    let Some(root) = std::env::var_os("RAYWARD_SCENES").filter(|value| !value.is_empty()) else {
         println!("skipped: RAYWARD_SCENES is not set");
         return None;
     };

@@ -4,6 +4,7 @@
 //! so their ending decides; without a known ending, `{` is taken for glTF and `solid` for STL.
 //! Limit: [`MAX_FILE_BYTES`] a file.
 
+mod base;
 mod gltf;
 mod obj;
 mod plain;

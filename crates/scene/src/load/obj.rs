@@ -14,9 +14,10 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use self::mtl::Library;
+use super::base::Base;
 use super::plain::{Source, counted, linear_from_srgb, number};
 use super::polygon::Triangulator;
 use crate::{Error, LoadOptions, Notice, Primitive, Scene};
@@ -36,10 +37,11 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
         library.read(source, names, &mut notices)?;
     }
 
+    let base = Base::of(file.positions.iter().copied());
     let mut primitives = Vec::new();
-    let mut scene = source.scene(Vec::new(), options);
+    let mut scene = source.scene(Vec::new(), base, options);
     for (name, faces) in file.faces_by_material() {
-        let mut primitive = file.primitive(source, &faces)?;
+        let mut primitive = file.primitive(source, base, &faces)?;
         if primitive.triangles.is_empty() {
             continue;
         }
@@ -117,7 +119,7 @@ struct Face {
 /// The content of an OBJ file, as it is.
 #[derive(Default)]
 struct ObjFile {
-    positions: Vec<Vec3>,
+    positions: Vec<DVec3>,
     /// Linear colours; as many as positions once one was given.
     colors: Vec<Vec4>,
     uvs: Vec<Vec2>,
@@ -139,10 +141,10 @@ impl ObjFile {
         match keyword {
             "v" => self.vertex(rest)?,
             "vt" => {
-                let [u, v, _] = numbers(rest, 1)?;
+                let [u, v, _] = numbers(rest, 1)?.map(|n| n as f32);
                 self.uvs.push(Vec2::new(u, 1.0 - v));
             }
-            "vn" => self.normals.push(Vec3::from_array(numbers(rest, 3)?)),
+            "vn" => self.normals.push(DVec3::from_array(numbers(rest, 3)?).as_vec3()),
             "f" | "fo" => self.face(rest, line)?,
             "usemtl" => {
                 let name = rest.trim();
@@ -162,7 +164,7 @@ impl ObjFile {
     }
 
     fn vertex(&mut self, text: &str) -> Result<(), String> {
-        self.positions.push(Vec3::from_array(numbers(text, 3)?));
+        self.positions.push(DVec3::from_array(numbers(text, 3)?));
         // After the position: nothing, a weight, a colour, or both.
         let extra = words(text).count().saturating_sub(3);
         if extra >= 3 {
@@ -238,7 +240,7 @@ impl ObjFile {
     }
 
     /// The triangles of these faces, with corners that are the same made one vertex.
-    fn primitive(&self, source: Source, faces: &[&Face]) -> Result<Primitive, Error> {
+    fn primitive(&self, source: Source, base: Base, faces: &[&Face]) -> Result<Primitive, Error> {
         let mut primitive = Primitive::default();
         let (mut has_uvs, mut has_normals) = (false, false);
         let mut vertex_of: HashMap<Corner, u32> = HashMap::new();
@@ -253,7 +255,7 @@ impl ObjFile {
                 has_uvs |= corner[1] != ABSENT;
                 has_normals |= corner[2] != ABSENT;
                 polygon.push(*vertex_of.entry(corner).or_insert_with(|| {
-                    self.add_vertex(corner, &mut primitive);
+                    self.add_vertex(corner, base, &mut primitive);
                     (primitive.positions.len() - 1) as u32
                 }));
             }
@@ -288,8 +290,9 @@ impl ObjFile {
         Ok(())
     }
 
-    fn add_vertex(&self, [position, uv, normal]: Corner, primitive: &mut Primitive) {
-        primitive.positions.push(self.positions[position as usize]);
+    fn add_vertex(&self, [position, uv, normal]: Corner, base: Base, primitive: &mut Primitive) {
+        let place = base.local(self.positions[position as usize]);
+        primitive.positions.push(place);
         primitive
             .uvs
             .push(self.uvs.get(uv as usize).copied().unwrap_or_default());
@@ -322,11 +325,11 @@ fn absolute(text: &str, count: usize) -> Result<u32, String> {
 }
 
 /// Up to three numbers, of which `needed` have to be there.
-fn numbers(text: &str, needed: usize) -> Result<[f32; 3], String> {
+fn numbers(text: &str, needed: usize) -> Result<[f64; 3], String> {
     let mut values = [0.0; 3];
     let mut count = 0;
     for (value, word) in values.iter_mut().zip(words(text)) {
-        *value = float(word)?;
+        *value = real(word)?;
         count += 1;
     }
     if count < needed {
@@ -336,10 +339,10 @@ fn numbers(text: &str, needed: usize) -> Result<[f32; 3], String> {
     }
 }
 
+fn real(word: &str) -> Result<f64, String> {
+    number(word).ok_or_else(|| format!("{word:?} is not a number"))
+}
+
 fn float(word: &str) -> Result<f32, String> {
-    // Straight to f32: by way of f64 a few numbers would be rounded twice.
-    word.parse()
-        .ok()
-        .or_else(|| number(word).map(|n| n as f32))
-        .ok_or_else(|| format!("{word:?} is not a number"))
+    real(word).map(|value| value as f32)
 }

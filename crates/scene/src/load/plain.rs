@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use glam::{DMat4, DVec4};
+use glam::{DMat4, DVec3, DVec4};
 
+use super::base::Base;
 use super::read_file;
 use crate::{Error, LoadOptions, Material, Mesh, Node, Notice, Primitive, Sampler, Scene, Transform, UpAxis};
 
@@ -36,8 +37,8 @@ impl Source<'_> {
         }
     }
 
-    /// A scene of one node whose transform turns and scales the file's coordinates.
-    pub(super) fn scene(&self, primitives: Vec<Primitive>, options: &LoadOptions) -> Scene {
+    /// A scene of one node whose transform adds the base and then turns and scales the file's coordinates.
+    pub(super) fn scene(&self, primitives: Vec<Primitive>, base: Base, options: &LoadOptions) -> Scene {
         let stem = self
             .path
             .file_stem()
@@ -46,7 +47,7 @@ impl Source<'_> {
         Scene {
             nodes: vec![Node {
                 name: stem.clone(),
-                transform: world_from_file(options),
+                transform: world_from_file(base, options),
                 mesh: Some(0),
                 ..Node::default()
             }],
@@ -72,18 +73,19 @@ pub(super) fn default_material() -> Material {
 }
 
 /// The root transform. Written as a matrix, since a rotation by a quaternion would not be exact.
-fn world_from_file(options: &LoadOptions) -> Transform {
+fn world_from_file(Base(base): Base, options: &LoadOptions) -> Transform {
     let s = options.scale;
-    match options.up {
-        UpAxis::Y if s == 1.0 => Transform::default(),
-        UpAxis::Y => Transform::Matrix(DMat4::from_diagonal(DVec4::new(s, s, s, 1.0))),
-        UpAxis::Z => Transform::Matrix(DMat4::from_cols(
+    let turned = match options.up {
+        UpAxis::Y if s == 1.0 && base == DVec3::ZERO => return Transform::default(),
+        UpAxis::Y => DMat4::from_diagonal(DVec4::new(s, s, s, 1.0)),
+        UpAxis::Z => DMat4::from_cols(
             DVec4::new(s, 0.0, 0.0, 0.0),
             DVec4::new(0.0, 0.0, -s, 0.0),
             DVec4::new(0.0, s, 0.0, 0.0),
             DVec4::W,
-        )),
-    }
+        ),
+    };
+    Transform::Matrix(turned * DMat4::from_translation(base))
 }
 
 /// A notice about `count` things at once, or none.
@@ -95,11 +97,29 @@ pub(super) fn counted(count: usize, place: &str, message: &str) -> Option<Notice
 }
 
 /// A number as C and C++ programs print it: also `nan`, `-inf` and the `1.#IND` of old Microsoft libraries.
+///
+/// The f64 nearest to the text, or its neighbour where the nearest lies in the middle between two f32: `as f32`
+/// then gives what the text itself would be rounded to, not what two roundings make of it.
 pub(super) fn number(token: &str) -> Option<f64> {
-    token
-        .parse()
-        .ok()
-        .or_else(|| token.contains(".#").then_some(f64::NAN))
+    /// The first of the bits of an f64 that an f32 has no room for.
+    const HALF: u64 = 1 << 28;
+    let Ok(value) = token.parse::<f64>() else {
+        return token.contains(".#").then_some(f64::NAN);
+    };
+    // Below the normal numbers an f32 has room for less.
+    let tie = value.to_bits() & (2 * HALF - 1) == HALF
+        || (value != 0.0 && value.abs() < f64::from(f32::MIN_POSITIVE));
+    let once = match token.parse::<f32>() {
+        Ok(once) if tie => f64::from(once),
+        _ => return Some(value),
+    };
+    if f64::from(value as f32) == once {
+        Some(value)
+    } else if once > value {
+        Some(value.next_up())
+    } else {
+        Some(value.next_down())
+    }
 }
 
 /// The linear value of an sRGB one.

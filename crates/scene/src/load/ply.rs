@@ -11,10 +11,11 @@ mod header;
 
 use std::path::Path;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use self::body::Body;
 use self::header::{Element, Header, Kind};
+use super::base::Base;
 use super::plain::{Source, counted, linear_from_srgb};
 use super::polygon::Triangulator;
 use crate::{Error, LoadOptions, Notice, Primitive, Scene};
@@ -42,6 +43,8 @@ struct Problem {
 /// What has been read so far.
 #[derive(Default)]
 struct Reader {
+    /// Positions of the vertices; those of the primitive follow when all are known.
+    positions: Vec<DVec3>,
     primitive: Primitive,
     /// Corners of all polygons, one after the other: triangulated at the end, when all vertices are known.
     corners: Vec<u32>,
@@ -119,7 +122,7 @@ impl Reader {
             });
         }
         let (normals, colors, uvs) = (has(3..6), has(6..9), has(10..12));
-        let mut row = [0.0f32; 12];
+        let mut row = [0.0; 12];
         row[9] = 1.0;
         for index in 0..element.count {
             body.begin_row(element, index)?;
@@ -132,14 +135,14 @@ impl Reader {
                         } else {
                             1.0
                         };
-                        row[role] = (value / unit) as f32;
+                        row[role] = value / unit;
                     }
                     (kind, _) => body.skip(kind)?,
                 }
             }
-            let [x, y, z, nx, ny, nz, r, g, b, a, u, v] = row;
+            self.positions.push(DVec3::new(row[0], row[1], row[2]));
+            let [_, _, _, nx, ny, nz, r, g, b, a, u, v] = row.map(|value| value as f32);
             let primitive = &mut self.primitive;
-            primitive.positions.push(Vec3::new(x, y, z));
             if normals {
                 primitive.normals.push(Vec3::new(nx, ny, nz));
             }
@@ -193,7 +196,10 @@ impl Reader {
     }
 
     fn finish(mut self, source: Source, header: &Header, options: &LoadOptions) -> Result<Scene, Error> {
-        let count = self.primitive.positions.len();
+        let count = self.positions.len();
+        let base = Base::of(self.positions.iter().copied());
+        self.primitive.positions = self.positions.iter().map(|&p| base.local(p)).collect();
+        self.positions = Vec::new();
         let outside = |i: &u32| *i as usize >= count;
         let out_of_range = |place: String| {
             source.malformed(
@@ -226,7 +232,7 @@ impl Reader {
             "element face",
             "faces of fewer than three corners skipped",
         );
-        let mut scene = source.scene(vec![self.primitive], options);
+        let mut scene = source.scene(vec![self.primitive], base, options);
         scene.notices = self.notices;
         scene.notices.extend(skipped);
         scene

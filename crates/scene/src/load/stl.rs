@@ -7,8 +7,9 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
+use super::base::Base;
 use super::plain::{Source, counted, number};
 use super::polygon::Triangulator;
 use crate::{Error, LoadOptions, Notice, Primitive, Scene};
@@ -20,19 +21,21 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     let source = Source { path };
     let bytes = source.read()?;
     let mut notices = Vec::new();
-    let primitives = if is_ascii(&bytes) {
+    let solids = if is_ascii(&bytes) {
         read_ascii(source, &String::from_utf8_lossy(&bytes))?
     } else {
         vec![read_binary(source, &bytes, &mut notices)?]
     };
-    let primitives: Vec<Primitive> = primitives
-        .into_iter()
-        .filter(|p| !p.triangles.is_empty())
+    let base = Base::of(solids.iter().flat_map(|solid| &solid.corners).copied());
+    let primitives: Vec<Primitive> = solids
+        .iter()
+        .filter(|solid| !solid.facets.is_empty())
+        .map(|solid| solid.primitive(base))
         .collect();
     if primitives.is_empty() {
         return Err(source.empty("0 facets"));
     }
-    let mut scene = source.scene(primitives, options);
+    let mut scene = source.scene(primitives, base, options);
     scene.notices = notices;
     Ok(scene)
 }
@@ -50,7 +53,7 @@ fn facet_count(bytes: &[u8]) -> Option<usize> {
         .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize)
 }
 
-fn read_binary(source: Source, bytes: &[u8], notices: &mut Vec<Notice>) -> Result<Primitive, Error> {
+fn read_binary(source: Source, bytes: &[u8], notices: &mut Vec<Notice>) -> Result<Solid, Error> {
     let Some(count) = facet_count(bytes) else {
         let found = format!(
             "{} bytes are less than a header, and it does not begin with \"solid\"",
@@ -74,18 +77,17 @@ fn read_binary(source: Source, bytes: &[u8], notices: &mut Vec<Notice>) -> Resul
     let mut solid = Solid::default();
     for facet in body.chunks_exact(FACET_BYTES).take(count) {
         let float = |at: usize| f32::from_le_bytes([facet[at], facet[at + 1], facet[at + 2], facet[at + 3]]);
-        let corner = |at: usize| Vec3::new(float(at), float(at + 4), float(at + 8));
-        let triangle = [12, 24, 36].map(|at| solid.vertex(corner(at)));
-        solid.primitive.triangles.push(triangle);
+        let corner = |at: usize| Vec3::new(float(at), float(at + 4), float(at + 8)).as_dvec3();
+        solid.corners.extend([12, 24, 36].map(corner));
+        solid.facets.push(3);
     }
-    Ok(solid.primitive)
+    Ok(solid)
 }
 
-fn read_ascii(source: Source, text: &str) -> Result<Vec<Primitive>, Error> {
+fn read_ascii(source: Source, text: &str) -> Result<Vec<Solid>, Error> {
     let mut solids = Vec::new();
     let mut solid = Solid::default();
-    let mut triangulator = Triangulator::default();
-    let mut facet: Option<Vec<Vec3>> = None;
+    let mut facet: Option<u32> = None;
     let mut last_line = 0;
     for (index, line) in text.lines().enumerate() {
         last_line = index + 1;
@@ -93,24 +95,25 @@ fn read_ascii(source: Source, text: &str) -> Result<Vec<Primitive>, Error> {
         let mut tokens = line.split_ascii_whitespace();
         let Some(keyword) = tokens.next() else { continue };
         match (keyword.to_ascii_lowercase().as_str(), &mut facet) {
-            ("facet", None) => facet = Some(Vec::new()),
+            ("facet", None) => facet = Some(0),
             ("vertex", Some(corners)) => {
-                let mut next = || tokens.next().and_then(number).map(|n| n as f32);
+                let mut next = || tokens.next().and_then(number);
                 let (Some(x), Some(y), Some(z)) = (next(), next(), next()) else {
                     return Err(source.malformed(place(), "a vertex needs three numbers"));
                 };
-                corners.push(Vec3::new(x, y, z));
+                solid.corners.push(DVec3::new(x, y, z));
+                *corners += 1;
             }
             ("endfacet", Some(corners)) => {
-                if corners.len() < 3 {
-                    let problem = format!("a facet of {} vertices", corners.len());
+                if *corners < 3 {
+                    let problem = format!("a facet of {corners} vertices");
                     return Err(source.malformed(place(), problem));
                 }
-                solid.add_polygon(corners, &mut triangulator);
+                solid.facets.push(*corners);
                 facet = None;
             }
             ("solid" | "endsolid", None) => {
-                solids.push(std::mem::take(&mut solid).primitive);
+                solids.push(std::mem::take(&mut solid));
             }
             ("outer" | "endloop", Some(_)) => {}
             (other, _) => {
@@ -122,35 +125,42 @@ fn read_ascii(source: Source, text: &str) -> Result<Vec<Primitive>, Error> {
     if facet.is_some() {
         return Err(source.malformed(format!("line {last_line}"), "the file ends inside a facet"));
     }
-    solids.push(solid.primitive);
+    solids.push(solid);
     Ok(solids)
 }
 
-/// A primitive whose corners are welded as they come.
+/// The facets of a solid as they come.
 #[derive(Default)]
 struct Solid {
-    primitive: Primitive,
-    vertices: HashMap<[u32; 3], u32>,
+    /// Corners of all facets, one after the other.
+    corners: Vec<DVec3>,
+    /// Number of corners of each facet.
+    facets: Vec<u32>,
 }
 
 impl Solid {
-    fn vertex(&mut self, position: Vec3) -> u32 {
-        // Adding zero makes the two zeros one.
-        let key = (position + Vec3::ZERO).to_array().map(f32::to_bits);
-        *self.vertices.entry(key).or_insert_with(|| {
-            self.primitive.positions.push(position);
-            (self.primitive.positions.len() - 1) as u32
-        })
-    }
-
-    fn add_polygon(&mut self, corners: &[Vec3], triangulator: &mut Triangulator) {
-        triangulator.triangulate(
-            corners.len(),
-            |i| corners[i],
-            |triangle| {
-                let triangle = triangle.map(|i| self.vertex(corners[i]));
-                self.primitive.triangles.push(triangle);
-            },
-        );
+    /// Its triangles, with corners at the same place made one vertex.
+    fn primitive(&self, base: Base) -> Primitive {
+        let mut primitive = Primitive::default();
+        let mut vertices: HashMap<[u32; 3], u32> = HashMap::new();
+        let mut triangulator = Triangulator::default();
+        let mut rest = &self.corners[..];
+        for &count in &self.facets {
+            let (corners, after) = rest.split_at(count as usize);
+            rest = after;
+            let corner = |i: usize| base.local(corners[i]);
+            triangulator.triangulate(corners.len(), corner, |triangle| {
+                let triangle = triangle.map(|i| {
+                    // Adding zero makes the two zeros one.
+                    let key = (corner(i) + Vec3::ZERO).to_array().map(f32::to_bits);
+                    *vertices.entry(key).or_insert_with(|| {
+                        primitive.positions.push(corner(i));
+                        (primitive.positions.len() - 1) as u32
+                    })
+                });
+                primitive.triangles.push(triangle);
+            });
+        }
+        primitive
     }
 }

@@ -15,7 +15,7 @@
 
 mod animation;
 mod lights;
-mod origin;
+pub(crate) mod origin;
 mod triangles;
 mod vertices;
 

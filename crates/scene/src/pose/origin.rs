@@ -23,6 +23,11 @@ pub(super) fn choose(scene: &Scene) -> DVec3 {
     let Some((lo, hi)) = rest_bounds(scene) else {
         return DVec3::ZERO;
     };
+    of_box(lo, hi)
+}
+
+/// The rule for the box between two corners.
+pub(crate) fn of_box(lo: DVec3, hi: DVec3) -> DVec3 {
     let center = lo.midpoint(hi);
     let radius = (hi - lo).length() / 2.0;
     if center.abs().max_element() <= NEAR * radius {
