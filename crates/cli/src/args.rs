@@ -24,7 +24,7 @@ Exit codes:
   3    an input cannot be read, is malformed or not supported
   4    an input or a picture is over a limit
   5    compare: the pictures differ by more than is tolerated
-  130  interrupted by Ctrl-C; no file is left unfinished";
+  130  interrupted by Ctrl-C (143 terminated, 129 hung up); no file is left unfinished";
 
 const RENDER_HELP: &str = "\
 Coordinates are those of the scene as it is rendered: metres, right-handed, +Y up.
@@ -98,9 +98,9 @@ pub(crate) struct MomentArgs {
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = values::single,
         allow_hyphen_values = true)]
     pub(crate) time: f32,
-    /// Which animation plays, from 0; the first unless given
-    #[arg(long, value_name = "INDEX")]
-    pub(crate) animation: Option<usize>,
+    /// Which animation plays, by name or index; the first unless given
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) animation: Option<String>,
 }
 
 impl MomentArgs {

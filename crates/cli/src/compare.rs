@@ -2,14 +2,17 @@
 
 use std::path::Path;
 
-use rayward::image_io::write_png;
-use rayward::{CompareOptions, Comparison, read_picture};
+use rayward::image_io::{read_picture_up_to, write_png};
+use rayward::{CompareOptions, Comparison};
 use serde::Serialize;
 
 use crate::args::CompareArgs;
 use crate::failure::{Code, Failure};
-use crate::interrupt;
+use crate::machine;
 use crate::report::{self, clean, thousands};
+
+/// Memory that comparing takes for a pixel of one picture, in bytes.
+const PIXEL_BYTES: u64 = 100;
 
 /// The result; its fields are those of the JSON object. Numbers that are not finite are null there.
 #[derive(Serialize)]
@@ -54,11 +57,14 @@ pub(crate) fn run(args: &CompareArgs) -> std::result::Result<(), Failure> {
             ),
         ));
     }
-    let (a, b) = (read_picture(&args.a)?, read_picture(&args.b)?);
+    // Two pictures at once, each with its copies in other values and scales.
+    let limit = machine::available_memory().map_or(u64::MAX, |bytes| bytes / (2 * PIXEL_BYTES));
+    let read = |path| read_picture_up_to(path, limit);
+    let (a, b) = (read(&args.a)?, read(&args.b)?);
     let comparison = rayward::compare(&a, &b, &CompareOptions::default())?;
     if let Some(path) = &args.difference {
         let picture = comparison.difference_picture();
-        interrupt::postpone(|| write_png(path, comparison.width, comparison.height, &picture))?;
+        write_png(path, comparison.width, comparison.height, &picture)?;
     }
     let result = Result::new(args, &comparison);
     if args.json {

@@ -6,7 +6,7 @@ use rayward::{Error, scene};
 
 use crate::report;
 
-/// Exit codes, as documented in `rayward --help`.
+/// Exit codes, as documented in `rayward --help`; those of signals are made where these are caught.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Code {
@@ -20,8 +20,6 @@ pub(crate) enum Code {
     Limit = 4,
     /// Two pictures differ by more than is tolerated.
     Beyond = 5,
-    /// Ended by Ctrl-C.
-    Interrupted = 130,
 }
 
 impl From<Code> for ExitCode {
@@ -77,7 +75,7 @@ impl From<Error> for Failure {
             | Error::MalformedImage { .. }
             | Error::UnknownImageFormat { .. }
             | Error::Camera { .. } => Code::Input,
-            Error::ImageSize { .. } => Code::Limit,
+            Error::ImageSize { .. } | Error::ImageTooLarge { .. } => Code::Limit,
             Error::SizeMismatch { .. } => Code::Beyond,
             _ => Code::Runtime,
         };

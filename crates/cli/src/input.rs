@@ -49,20 +49,12 @@ impl Input {
     /// Poses the scene, if it is not too large to be posed.
     pub(crate) fn pose(&self, moment: &MomentArgs) -> Result<FrameGeometry, Failure> {
         self.check_size()?;
-        let animations = self.scene.animations.len();
-        if let Some(index) = moment.animation.filter(|&index| index >= animations) {
-            let problem = match animations {
-                0 => "has no animation".into(),
-                1 => "has only animation 0".into(),
-                _ => format!("has only the animations 0 to {}", animations - 1),
-            };
-            return Err(Failure::new(
-                Code::Usage,
-                format_args!("--animation {index}: {} {problem}", self.path.display()),
-            ));
-        }
+        let names = self.scene.animations.iter().map(|animation| &*animation.name);
+        let animation = match &moment.animation {
+            Some(wanted) => choose("animation", wanted, names, &self.path)?,
+            None => 0,
+        };
         let mut frame = FrameGeometry::default();
-        let animation = moment.animation.unwrap_or(0);
         self.scene.at_animation(Some(animation), moment.time, &mut frame);
         Ok(frame)
     }
@@ -83,15 +75,40 @@ impl Input {
         }
         // Positions and indices alone, see `FrameGeometry`.
         let bytes = 12 * vertices + 16 * triangles;
-        match machine::total_memory() {
+        match machine::available_memory() {
             Some(memory) if bytes > memory => Err(too_large(
                 format!("the size of {bytes} bytes"),
-                format!("this machine's memory, {memory} bytes"),
+                format!("the memory that could be had now, {memory} bytes"),
             )
             .into()),
             _ => Ok(()),
         }
     }
+}
+
+/// Position of the thing of this name, or else of this index; `what` names it, and the option that asks for it.
+pub(crate) fn choose<'a>(
+    what: &str,
+    wanted: &str,
+    names: impl Iterator<Item = &'a str> + Clone,
+    path: &Path,
+) -> Result<usize, Failure> {
+    let by_name = names.clone().position(|name| name == wanted);
+    let by_index = || wanted.parse().ok().filter(|&index| index < names.clone().count());
+    by_name.or_else(by_index).ok_or_else(|| {
+        let known: Vec<_> = names
+            .enumerate()
+            .map(|(i, name)| format!("{i} {name:?}"))
+            .collect();
+        let known = match known.len() {
+            0 => format!("no {what}"),
+            _ => known.join(", "),
+        };
+        Failure::new(
+            Code::Usage,
+            format_args!("--{what} {wanted}: not in {}, which has {known}", path.display()),
+        )
+    })
 }
 
 /// Middle of the box around the frame, in world space.

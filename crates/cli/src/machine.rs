@@ -47,9 +47,15 @@ pub(crate) fn total_memory() -> Option<u64> {
     kibibytes("/proc/meminfo", "MemTotal:")
 }
 
-/// Memory that could be had now, in bytes, where the system tells.
+/// Memory that could be had now, in bytes, where the system tells: what is free or could be freed, or what is left
+/// of a smaller limit for this process's control group.
 pub(crate) fn available_memory() -> Option<u64> {
-    kibibytes("/proc/meminfo", "MemAvailable:")
+    let machine = kibibytes("/proc/meminfo", "MemAvailable:");
+    let bytes = |file| std::fs::read_to_string(file).ok()?.trim().parse::<u64>().ok();
+    let limit = bytes("/sys/fs/cgroup/memory.max");
+    let used = bytes("/sys/fs/cgroup/memory.current").unwrap_or(0);
+    let group = limit.map(|limit| limit.saturating_sub(used));
+    machine.into_iter().chain(group).min()
 }
 
 fn kibibytes(file: &str, key: &str) -> Option<u64> {

@@ -8,7 +8,6 @@ use rayward::{Error, Film, IntensityRange, LayerKind, Layers, ToneMap, ToneMappe
 
 use crate::args::{PictureArgs, TargetArgs};
 use crate::failure::{Code, Failure};
-use crate::interrupt;
 use crate::report;
 use crate::values::{self, Operator};
 
@@ -77,17 +76,30 @@ impl Targets {
         })
     }
 
-    /// Writes everything; returns the files. An interrupt waits until each is whole.
+    /// Memory for a pixel, in bytes: what the film holds of it, and what the largest of the writers holds besides.
+    pub(crate) fn bytes_a_pixel(&self) -> u64 {
+        let film = self.layers.bytes_a_pixel();
+        let writing = match &self.picture {
+            // The film once more by channels, in lines and compressed.
+            Some((_, Form::Exr)) => film + 8,
+            // Three bytes, filtered, compressed, and perhaps gathered for standard output.
+            Some((_, Form::Png)) => 12,
+            Some((_, Form::Npy)) | None => 0,
+        };
+        film + writing
+    }
+
+    /// Writes everything; returns the files.
     pub(crate) fn write(&self, film: &Film) -> Result<Vec<PathBuf>, Failure> {
         let mut files = Vec::new();
         match &self.picture {
             Some((None, _)) => self.write_to_stdout(film)?,
             Some((Some(path), form)) => {
-                interrupt::postpone(|| match form {
+                match form {
                     Form::Png => write_png(path, film.width(), film.height(), &self.encode(film)),
                     Form::Exr => write_exr(path, film),
                     Form::Npy => write_npy(path, film, LayerKind::Color),
-                })?;
+                }?;
                 files.push(path.clone());
             }
             None => {}
@@ -99,7 +111,7 @@ impl Targets {
             })?;
             for kind in values::kinds(film) {
                 let path = folder.join(format!("{}.npy", kind.name()));
-                interrupt::postpone(|| write_npy(&path, film, kind))?;
+                write_npy(&path, film, kind)?;
                 files.push(path);
             }
         }

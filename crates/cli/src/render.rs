@@ -28,7 +28,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         ..options(&args.picture)
     };
 
-    check_memory(&options)?;
+    check_memory(&options, targets.bytes_a_pixel())?;
 
     let bar = Bar::new(!args.run.quiet);
     bar.phase("reading");
@@ -117,24 +117,17 @@ fn picture(
 }
 
 /// A picture that cannot fit is an error now instead of a killed process later.
-fn check_memory(options: &RenderOptions) -> Result<(), Failure> {
-    let layers = options.layers;
-    let layer = |kept: bool, bytes: u128| if kept { bytes } else { 0 };
-    // Bytes a pixel of each layer, see `Film`.
-    let pixel = 12
-        + layer(layers.alpha, 4)
-        + layer(layers.depth, 4)
-        + layer(layers.distance, 4)
-        + layer(layers.normal, 12)
-        + layer(layers.object, 4)
-        + layer(layers.prim, 4)
-        + layer(layers.bary, 8);
+///
+/// `pixel` is what it takes in bytes, film and writing together.
+fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Failure> {
     let (width, height) = (options.width, options.height);
-    let bytes = u128::from(width) * u128::from(height) * pixel;
-    match machine::total_memory() {
+    let bytes = u128::from(width) * u128::from(height) * u128::from(pixel);
+    match machine::available_memory() {
         Some(memory) if bytes > u128::from(memory) => Err(Failure::new(
             Code::Limit,
-            format_args!("a picture of {width}x{height} takes {bytes} bytes, this machine has {memory}"),
+            format_args!(
+                "a picture of {width}x{height} takes {bytes} bytes to make and write, {memory} could be had now"
+            ),
         )),
         _ => Ok(()),
     }

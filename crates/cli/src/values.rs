@@ -31,8 +31,11 @@ pub(crate) fn direction(text: &str) -> Parsed<DVec3> {
 
 /// A linear colour `r,g,b`, no component below 0.
 pub(crate) fn color(text: &str) -> Parsed<Vec3> {
-    let color = vector(text)?.as_vec3();
-    if color.is_finite() && color.min_element() >= 0.0 {
+    let [r, g, b] = *text.split(',').collect::<Vec<_>>() else {
+        return Err("a colour has three numbers r,g,b".into());
+    };
+    let color = Vec3::new(single(r)?, single(g)?, single(b)?);
+    if color.min_element() >= 0.0 {
         Ok(color)
     } else {
         Err("no component of a colour may be below 0".into())
@@ -59,7 +62,7 @@ pub(crate) fn not_negative(text: &str) -> Parsed<f64> {
 pub(crate) fn single(text: &str) -> Parsed<f32> {
     match number(text)? as f32 {
         value if value.is_finite() => Ok(value),
-        _ => Err("it is too large".into()),
+        _ => Err("it is too large for single precision".into()),
     }
 }
 
@@ -223,7 +226,11 @@ mod tests {
         }
         assert!(direction("0,0,0").is_err());
         assert!(color("0.1,-0.1,0").is_err());
-        assert!(color("1e300,0,0").is_err());
+        assert_eq!(
+            color("0,1,1e39"),
+            Err("it is too large for single precision".into())
+        );
+        assert!(color("1e39").is_err_and(|message| message.contains("three numbers")));
     }
 
     #[test]

@@ -64,7 +64,9 @@ impl View {
         } else if let Some(entry) = &entry {
             (entry.camera(), Origin::CameraFile)
         } else if let Some(wanted) = &args.camera {
-            (named(wanted, &frame.cameras, &input.path)?, Origin::Scene)
+            let names = frame.cameras.iter().map(|camera| &*camera.name);
+            let chosen = input::choose("camera", wanted, names, &input.path)?;
+            (frame.cameras[chosen].clone(), Origin::Scene)
         } else if let Some(first) = frame.cameras.first() {
             (first.clone(), Origin::Scene)
         } else {
@@ -142,27 +144,6 @@ fn placed(args: &ViewArgs, eye: DVec3, frame: &FrameGeometry) -> Result<PosedCam
         forward,
         up: up.normalize(),
         projection: perspective(VFOV_DEGREES),
-    })
-}
-
-/// The camera of this name, or else of this index.
-fn named(wanted: &str, cameras: &[PosedCamera], path: &Path) -> Result<PosedCamera, Failure> {
-    let by_name = cameras.iter().find(|camera| camera.name == wanted);
-    let by_index = || cameras.get(wanted.parse::<usize>().ok()?);
-    by_name.or_else(by_index).cloned().ok_or_else(|| {
-        let known: Vec<_> = cameras
-            .iter()
-            .enumerate()
-            .map(|(i, camera)| format!("{i} {:?}", camera.name))
-            .collect();
-        let known = match known.len() {
-            0 => "no camera".into(),
-            _ => known.join(", "),
-        };
-        Failure::new(
-            Code::Usage,
-            format_args!("--camera {wanted}: not in {}, which has {known}", path.display()),
-        )
     })
 }
 

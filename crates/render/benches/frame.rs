@@ -40,7 +40,7 @@ fn scenes() -> Vec<String> {
         "collide",
     ];
     let mut names: Vec<String> = built_in.map(String::from).to_vec();
-    if std::env::var_os("RAYWARD_SCENES").is_some() && !is_test() {
+    if std::env::var_os("RAYWARD_SCENES").is_some_and(|value| !value.is_empty()) && !is_test() {
         let meshes = [
             "bunny69k",
             "conference331k",

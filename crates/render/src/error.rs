@@ -51,6 +51,18 @@ pub enum Error {
         /// What is wrong with it.
         problem: &'static str,
     },
+    /// An image file has more pixels than are to be read.
+    #[error("{}: an image of {width}x{height} is over the limit of {limit} pixels", path.display())]
+    ImageTooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Width in pixels.
+        width: u32,
+        /// Height in pixels.
+        height: u32,
+        /// The most pixels.
+        limit: u64,
+    },
     /// Two images that should be compared differ in size.
     #[error("the images differ in size: {a_width}x{a_height} and {b_width}x{b_height}")]
     SizeMismatch {
@@ -105,9 +117,11 @@ impl Error {
     }
 }
 
+/// The most pixels an image may have.
+pub(crate) const MAX_PIXELS: u64 = 1 << 30;
+
 /// Checks that an image has pixels and not more than memory can be meant to hold.
 pub(crate) fn check_size(width: u32, height: u32) -> Result<usize> {
-    const MAX_PIXELS: u64 = 1 << 30;
     let pixels = u64::from(width) * u64::from(height);
     match pixels {
         0 => Err(Error::ImageSize {

@@ -41,6 +41,23 @@ impl Layers {
         prim: true,
         bary: true,
     };
+
+    /// Memory that a film with these layers takes for a pixel, colour included, in bytes.
+    pub fn bytes_a_pixel(self) -> u64 {
+        let Self {
+            alpha,
+            depth,
+            distance,
+            normal,
+            object,
+            prim,
+            bary,
+        } = self;
+        let words = [alpha, depth, distance, object, prim].map(|kept| (kept, 1));
+        let vectors = [(true, 3), (normal, 3), (bary, 2)];
+        let kept = words.iter().chain(&vectors).filter(|(kept, _)| *kept);
+        4 * kept.map(|(_, words)| words).sum::<u64>()
+    }
 }
 
 /// One layer of a film.

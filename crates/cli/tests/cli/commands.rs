@@ -251,37 +251,6 @@ fn a_reader_that_leaves_is_no_disaster() {
     }
 }
 
-/// Ctrl-C while a picture is rendered: the code of an interrupt, and nothing left behind.
-#[cfg(target_os = "linux")]
-#[test]
-fn an_interrupt_leaves_nothing_behind() {
-    use std::time::{Duration, Instant};
-
-    let folder = Folder::new();
-    let arguments = ["render", "--builtin", "forest", "--resolution", "8000x8000", "-q"];
-    let mut child = folder.command(&arguments).spawn().expect("the program runs");
-    let status = format!("/proc/{}/status", child.id());
-    let start = Instant::now();
-    // The handler is there when the mask of caught signals has SIGINT, the second bit.
-    let caught = || {
-        let text = std::fs::read_to_string(&status).unwrap_or_default();
-        let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
-            .is_some_and(|mask| mask & 2 != 0)
-    };
-    while !caught() {
-        assert!(start.elapsed() < Duration::from_secs(60), "no handler");
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    std::thread::sleep(Duration::from_millis(50));
-    let kill = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
-    assert!(kill.is_ok_and(|status| status.success()));
-    assert_eq!(child.wait().expect("the program ends").code(), Some(130));
-    assert!(folder.names().is_empty(), "{:?}", folder.names());
-}
-
 #[test]
 fn compare_neither_overwrites_its_inputs_nor_reads_without_end() {
     let folder = Folder::new();
@@ -313,6 +282,21 @@ fn compare_neither_overwrites_its_inputs_nor_reads_without_end() {
             endless.stderr
         );
     }
+}
+
+#[test]
+fn compare_refuses_pictures_over_the_limit() {
+    let folder = Folder::new();
+    // A promise of 1.6 thousand million pixels without any.
+    let mut dictionary = "{'descr': '<f4', 'fortran_order': False, 'shape': (40000, 40000), }".to_owned();
+    dictionary.push_str(&" ".repeat(117 - dictionary.len()));
+    dictionary.push('\n');
+    let array = [b"\x93NUMPY\x01\x00\x76\x00", dictionary.as_bytes()].concat();
+    folder.file("large.npy", &array);
+    folder
+        .run(&["compare", "large.npy", "large.npy"])
+        .expect(4)
+        .says(&["large.npy", "40000x40000"]);
 }
 
 #[test]

@@ -3,4 +3,6 @@
 mod bad_input;
 mod commands;
 mod render;
+#[cfg(target_os = "linux")]
+mod signals;
 mod support;

@@ -220,6 +220,36 @@ fn cameras_from_the_command_line_and_from_a_file() {
     wrong(&["--animation", "0"])
         .expect(2)
         .says(&["--animation 0", "no animation"]);
+    wrong(&["--background", "0,1e39,0"]).expect(2);
+}
+
+#[test]
+fn animations_are_chosen_by_name_or_index() {
+    let folder = Folder::new();
+    let run = |more: &[&str]| {
+        let base = [
+            "render",
+            "--builtin",
+            "walker",
+            "--time",
+            "0.3",
+            "--resolution",
+            "16x16",
+            "-q",
+        ];
+        folder.run(&[&base, more].concat())
+    };
+    let picture = |more: &[&str]| {
+        run(&[more, &["-o", "x.png"]].concat()).expect(0);
+        std::fs::read(folder.path("x.png")).expect("the picture")
+    };
+    let first = picture(&[]);
+    assert!(first == picture(&["--animation", "walk"]) && first == picture(&["--animation", "0"]));
+    for wanted in ["run", "1", "-1", ""] {
+        run(&[&format!("--animation={wanted}")])
+            .expect(2)
+            .says(&[&format!("--animation {wanted}"), "0 \"walk\""]);
+    }
 }
 
 #[test]

@@ -18,8 +18,8 @@ use exr::meta::header::LayerAttributes;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
 use glam::Vec4;
 
-use super::{Picture, file};
-use crate::error::check_size;
+use super::file;
+use super::picture::{Picture, SizeCheck};
 use crate::{Error, Film, Result};
 
 /// Writes all layers of a film.
@@ -79,7 +79,8 @@ fn to_io(error: exr::error::Error) -> io::Error {
 }
 
 /// The colour of the first part that has any.
-pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
+pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
+    let path = check.path;
     let malformed = |error: exr::error::Error| Error::malformed(path, format_args!("OpenEXR: {error}"));
     for header in MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(malformed)?
@@ -87,7 +88,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
     {
         let size = header.layer_size;
         let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
-        check_size(side(size.x()), side(size.y())).map_err(|error| Error::malformed(path, error))?;
+        check.pixels(side(size.x()), side(size.y()))?;
     }
     let image = read()
         .no_deep_data()

@@ -1,10 +1,74 @@
 //! Files as wholes: read at once, written beside their place and renamed.
+//!
+//! A process that is told to end does not unwind, so nothing would remove the files it has begun. They are therefore
+//! listed, and [`discard_unfinished`] removes them from whatever thread the end comes to.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::NamedTempFile;
 
 use crate::{Error, Result};
+
+/// Files that are begun and not yet in their place.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn unfinished() -> MutexGuard<'static, Vec<PathBuf>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// While this lives no file is begun or put in its place: whoever tries waits.
+#[derive(Debug)]
+pub struct Discarded {
+    _lock: MutexGuard<'static, Vec<PathBuf>>,
+}
+
+/// Removes every file that the process has begun to write, for a process that is about to end. A file is then there
+/// as a whole or not at all. What is returned should live until the end.
+pub fn discard_unfinished() -> Discarded {
+    let mut files = unfinished();
+    for path in files.drain(..) {
+        // If it is gone already, that is what is wanted.
+        let _ = fs::remove_file(path);
+    }
+    Discarded { _lock: files }
+}
+
+/// An entry of the list, taken off when it goes.
+struct Listed(PathBuf);
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        unfinished().retain(|path| *path != self.0);
+    }
+}
+
+/// A temporary file that is listed as unfinished. Fields go in this order: first the file, then its entry.
+struct Begun {
+    file: NamedTempFile,
+    _listed: Listed,
+}
+
+impl Begun {
+    fn new(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> io::Result<Self> {
+        // Made and listed under one lock, so that it is discarded too or not begun at all.
+        let mut files = unfinished();
+        let file = builder.tempfile_in(folder)?;
+        let path = file.path().to_path_buf();
+        files.push(path.clone());
+        let _listed = Listed(path);
+        Ok(Self { file, _listed })
+    }
+
+    fn put_in_place(self, target: &Path) -> io::Result<()> {
+        let lock = unfinished();
+        let put = self.file.persist(target).map_err(|e| e.error);
+        drop(lock);
+        put.map(|_| ())
+    }
+}
 
 /// What encoders write to.
 pub(super) trait Sink: Write + Seek {}
@@ -47,17 +111,15 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
         use std::os::unix::fs::PermissionsExt;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let mut buffered = BufWriter::with_capacity(1 << 16, builder.tempfile_in(folder)?);
+    let begun = Begun::new(&builder, folder)?;
     if let Some(permissions) = kept {
-        buffered.get_ref().as_file().set_permissions(permissions)?;
+        begun.file.as_file().set_permissions(permissions)?;
     }
+    let mut buffered = BufWriter::with_capacity(1 << 16, begun.file.as_file());
     encode(&mut buffered)?;
-    buffered
-        .into_inner()
-        .map_err(io::IntoInnerError::into_error)?
-        .persist(target)
-        .map_err(|e| e.error)?;
-    Ok(())
+    buffered.flush()?;
+    drop(buffered);
+    begun.put_in_place(target)
 }
 
 /// The whole content of a regular file; a pipe or a device may never end.

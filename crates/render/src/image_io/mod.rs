@@ -21,6 +21,7 @@ mod picture;
 mod png;
 
 pub use exr::{encode_exr, write_exr};
+pub use file::{Discarded, discard_unfinished};
 pub use npy::{encode_npy, write_npy};
-pub use picture::{Picture, read_picture};
+pub use picture::{Picture, read_picture, read_picture_up_to};
 pub use png::{encode_png, write_png};

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use glam::Vec4;
 
-use super::{Picture, file};
-use crate::error::check_size;
+use super::file;
+use super::picture::{Picture, SizeCheck};
 use crate::film::LayerKind;
 use crate::{Error, Film, Result};
 
@@ -119,7 +119,8 @@ enum Element {
 }
 
 /// An image of one to four channels.
-pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
+pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
+    let path = check.path;
     let fail = |problem: &str| Error::malformed(path, format_args!("NPY: {problem}"));
     let (dictionary, data) = split(bytes).ok_or_else(|| fail("the header is cut off"))?;
     if entry(dictionary, "fortran_order") != Some("False") {
@@ -136,7 +137,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
         [height, width, channels @ 1..=4] => (height, width, channels as usize),
         _ => return Err(fail("the shape is neither (h, w) nor (h, w, 1..4)")),
     };
-    let pixels = check_size(width, height).map_err(|error| fail(&error.to_string()))?;
+    let pixels = check.pixels(width, height)?;
     if data.len() != pixels * channels * size {
         return Err(fail(&format!(
             "{} bytes of data for a shape of {:?} {kind}",

@@ -1,12 +1,9 @@
 //! Portable float maps: three header lines, then f32 rows from the bottom up; the sign of the scale tells the
 //! byte order.
 
-use std::path::Path;
-
 use glam::Vec4;
 
-use super::Picture;
-use crate::error::check_size;
+use super::picture::{Picture, SizeCheck};
 use crate::{Error, Result};
 
 /// Whether these bytes start like a portable float map.
@@ -14,7 +11,8 @@ pub(super) fn is_pfm(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'F' | b'f', space, ..] if space.is_ascii_whitespace())
 }
 
-pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
+pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
+    let path = check.path;
     let fail = |problem: &str| Error::malformed(path, format_args!("PFM: {problem}"));
     let mut rest = bytes;
     let mut word = || {
@@ -36,7 +34,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let (kind, width, height, scale) =
         header().ok_or_else(|| fail("the header is cut off or not in numbers"))?;
     let channels = if kind == "PF" { 3 } else { 1 };
-    let pixels = check_size(width, height).map_err(|error| fail(&error.to_string()))?;
+    let pixels = check.pixels(width, height)?;
     if rest.len() != pixels * channels * 4 {
         return Err(fail(&format!(
             "{} bytes of data for {width}x{height}x{channels} floats",

@@ -4,9 +4,10 @@ use std::io::Cursor;
 use std::path::Path;
 
 use glam::Vec4;
-use image::DynamicImage;
+use image::{DynamicImage, ImageDecoder, ImageReader, ImageResult};
 
 use super::{exr, file, npy, pfm};
+use crate::error::{MAX_PIXELS, check_size};
 use crate::tonemap::{decode_srgb, encode_srgb};
 use crate::{Error, Film, Result};
 
@@ -78,32 +79,63 @@ impl From<&Film> for Picture {
 /// Reads an image; its format is known by its first bytes.
 ///
 /// # Errors
-/// [`Error::Read`] for what the system says, [`Error::UnknownImageFormat`], [`Error::MalformedImage`].
+/// [`Error::Read`] for what the system says, [`Error::UnknownImageFormat`], [`Error::MalformedImage`],
+/// [`Error::ImageTooLarge`].
 pub fn read_picture(path: &Path) -> Result<Picture> {
+    read_picture_up_to(path, MAX_PIXELS)
+}
+
+/// As [`read_picture`], but without reading the pixels if there are more than `limit`.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn read_picture_up_to(path: &Path, limit: u64) -> Result<Picture> {
     let bytes = file::read(path)?;
+    let check = SizeCheck {
+        path,
+        limit: limit.min(MAX_PIXELS),
+    };
     match bytes.get(..4) {
-        Some(b"\x76\x2f\x31\x01") => exr::decode(path, &bytes),
-        _ if npy::is_npy(&bytes) => npy::decode(path, &bytes),
-        _ if pfm::is_pfm(&bytes) => pfm::decode(path, &bytes),
-        _ => decode(path, &bytes),
+        Some(b"\x76\x2f\x31\x01") => exr::decode(check, &bytes),
+        _ if npy::is_npy(&bytes) => npy::decode(check, &bytes),
+        _ if pfm::is_pfm(&bytes) => pfm::decode(check, &bytes),
+        _ => decode(check, &bytes),
+    }
+}
+
+/// Checks the size that a file's header promises before anything of that size is made.
+#[derive(Clone, Copy)]
+pub(super) struct SizeCheck<'a> {
+    pub(super) path: &'a Path,
+    limit: u64,
+}
+
+impl SizeCheck<'_> {
+    /// The number of pixels.
+    pub(super) fn pixels(self, width: u32, height: u32) -> Result<usize> {
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > self.limit {
+            return Err(Error::ImageTooLarge {
+                path: self.path.into(),
+                width,
+                height,
+                limit: self.limit,
+            });
+        }
+        check_size(width, height).map_err(|error| Error::malformed(self.path, error))
     }
 }
 
 /// PNG, JPEG and HDR.
-fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
-    let mut reader = image::ImageReader::new(Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|source| Error::read(path, source))?;
-    if reader.format().is_none() {
-        return Err(Error::UnknownImageFormat {
-            path: path.into(),
-            known: "PNG, JPEG, EXR, HDR, NPY and PFM",
-        });
-    }
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(8 << 30);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|error| Error::malformed(path, error))?;
+fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
+    let path = check.path;
+    let mut cursor = Cursor::new(bytes);
+    let decoded = decode_from(check, &mut cursor)?;
+    let image = decoded.map_err(|error| {
+        // Decoders read ahead, so the place is that of the next byte they would have asked for.
+        let place = format_args!("near byte {} of {}", cursor.position(), bytes.len());
+        Error::malformed(path, format_args!("{place}: {error}"))
+    })?;
     let (width, height) = (image.width(), image.height());
     let (pixels, srgb) = match &image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => (
@@ -138,4 +170,26 @@ fn decode(path: &Path, bytes: &[u8]) -> Result<Picture> {
         pixels,
         srgb,
     })
+}
+
+/// The outer error is one of the file as a whole, the inner one belongs to the place the decoder has come to.
+fn decode_from(check: SizeCheck, cursor: &mut Cursor<&[u8]>) -> Result<ImageResult<DynamicImage>> {
+    let mut reader = ImageReader::new(cursor)
+        .with_guessed_format()
+        .map_err(|source| Error::read(check.path, source))?;
+    if reader.format().is_none() {
+        return Err(Error::UnknownImageFormat {
+            path: check.path.into(),
+            known: "PNG, JPEG, EXR, HDR, NPY and PFM",
+        });
+    }
+    // The size is checked here; beyond it the formats need little.
+    reader.no_limits();
+    let decoder = match reader.into_decoder() {
+        Ok(decoder) => decoder,
+        Err(error) => return Ok(Err(error)),
+    };
+    let (width, height) = decoder.dimensions();
+    check.pixels(width, height)?;
+    Ok(DynamicImage::from_decoder(decoder))
 }

@@ -1,0 +1,84 @@
+//! Signals: the code of each, promptly, and nothing left behind.
+
+use std::process::{Child, Command};
+use std::time::{Duration, Instant};
+
+use crate::support::Folder;
+
+/// Waits until something holds of the process.
+fn wait_until(what: &str, holds: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !holds() {
+        assert!(start.elapsed() < Duration::from_secs(60), "waited for {what}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// Whether the process catches this signal by now.
+fn catches(child: &Child, signal: u32) -> bool {
+    let text = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+    let mask = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .is_some_and(|mask| mask & (1 << (signal - 1)) != 0)
+}
+
+fn send(child: &Child, signal: &str) {
+    let sent = Command::new("kill")
+        .args([signal, &child.id().to_string()])
+        .status();
+    assert!(sent.is_ok_and(|status| status.success()));
+}
+
+#[test]
+fn a_signal_while_rendering_leaves_nothing_behind() {
+    for (signal, number) in [("-INT", 2), ("-TERM", 15)] {
+        let folder = Folder::new();
+        let arguments = ["render", "--builtin", "forest", "--resolution", "8000x8000", "-q"];
+        let mut child = folder.command(&arguments).spawn().expect("the program runs");
+        wait_until("a handler", || catches(&child, number));
+        std::thread::sleep(Duration::from_millis(50));
+        send(&child, signal);
+        let code = child.wait().expect("the program ends").code();
+        assert_eq!(code, Some(128 + number as i32), "{signal}");
+        assert!(folder.names().is_empty(), "{signal}: {:?}", folder.names());
+    }
+}
+
+#[test]
+fn a_signal_while_writing_does_not_wait_for_the_file() {
+    for (signal, code) in [("-INT", 130), ("-TERM", 143), ("-HUP", 129)] {
+        let folder = Folder::new();
+        let scene = ["render", "--builtin", "blob-1k", "--no-shadows", "-q"];
+        let picture = ["--resolution", "3000x2000", "--layers", "depth", "-o", "a.exr"];
+        let mut child = folder
+            .command(&[&scene[..], &picture].concat())
+            .spawn()
+            .expect("the program runs");
+        wait_until("a file that is being written", || !folder.names().is_empty());
+        send(&child, signal);
+        assert_eq!(
+            child.wait().expect("the program ends").code(),
+            Some(code),
+            "{signal}"
+        );
+        assert!(folder.names().is_empty(), "{signal}: {:?}", folder.names());
+    }
+}
+
+#[test]
+fn a_signal_that_the_caller_ignores_stays_ignored() {
+    let folder = Folder::new();
+    let program = env!("CARGO_BIN_EXE_rayward");
+    let script = format!("trap '' HUP; exec {program} render --builtin forest --resolution 8000x8000 -q");
+    let mut shell = Command::new("sh");
+    let mut child = shell
+        .args(["-c", &script])
+        .current_dir(folder.path("."))
+        .spawn()
+        .expect("a shell");
+    wait_until("a handler", || catches(&child, 15));
+    assert!(!catches(&child, 1));
+    send(&child, "-HUP");
+    send(&child, "-TERM");
+    assert_eq!(child.wait().expect("the program ends").code(), Some(143));
+}
