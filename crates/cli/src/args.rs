@@ -8,6 +8,7 @@ use clap_complete::Shell;
 use glam::{DVec3, Vec3};
 use rayward::scene::builtin;
 
+use crate::bench::BenchArgs;
 use crate::values::{self, Casters, LayerName, LightValue, Operator, Size, Up};
 
 const HELP: &str = "\
@@ -58,6 +59,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Say what this build uses of this machine, and test that it works
     Doctor(DoctorArgs),
+    /// Measure, beside other ray tracers
+    Bench(BenchArgs),
     /// Print a completion script for a shell
     Completions {
         /// The shell

@@ -4,6 +4,7 @@
 //! has its exit code, see [`failure::Code`].
 
 mod args;
+mod bench;
 mod compare;
 mod doctor;
 mod failure;
@@ -47,6 +48,7 @@ fn run(command: Command) -> Result<(), Failure> {
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Doctor(args) => doctor::run(&args),
+        Command::Bench(args) => bench::run(&args),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Cli::command(), "rayward", &mut script);

@@ -15,6 +15,7 @@ use crate::Triangles;
 use crate::bins::{Binning, Bins, CellGrid};
 use crate::clusters::Clusters;
 use crate::exact;
+use crate::facets::HitBlocks;
 use crate::kernel::SimdLevel;
 use crate::kernel::batch::{Left, TilePlace, draw_queue};
 use crate::kernel::cluster::{Seen, TileWork, sift_cluster};
@@ -143,10 +144,15 @@ impl TileHits {
         let prim = self.buffer.blocks[block].prim[lane];
         (prim != NONE).then_some(prim)
     }
+}
 
-    /// Triangles seen by all pixels of the tile, block by block.
-    pub(crate) fn prims(&self) -> &[[u32; LANES]] {
-        &self.buffer.prim
+impl HitBlocks for TileHits {
+    const DEPTH: bool = false;
+
+    #[inline]
+    fn block(&self, column: u32, row: u32) -> (&[u32; LANES], &[f32; LANES]) {
+        let block = TileHits::block(self, column, row);
+        (&block.prim, &block.nearness)
     }
 }
 

@@ -27,6 +27,7 @@ pub mod exact;
 mod eye_grid;
 mod faces;
 mod grid3;
+mod facets;
 mod kernel;
 mod light_grid;
 mod light_views;
@@ -52,6 +53,7 @@ pub use clusters::Clusters;
 pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use faces::FaceOptions;
 pub use grid3::{Grid3, RaySpan};
+pub use facets::{BLOCK_LANES, Facets, HitBlocks, darken};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
 pub use light_grid::{

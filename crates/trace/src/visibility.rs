@@ -99,8 +99,8 @@ pub(crate) fn place(stride: u32, x: u32, y: u32) -> (usize, usize) {
 impl VisibleTile {
     fn of(tile: Tile, hits: &TileHits) -> Self {
         let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
-        let mut prims = hits.prims().to_vec();
-        prims.truncate((stride * rows) as usize);
+        let blocks = (0..rows).flat_map(|row| (0..stride).map(move |column| (column, row)));
+        let mut prims: Vec<_> = blocks.map(|(column, row)| hits.block(column, row).prim).collect();
         // Blocks reach beyond the raster's edge.
         if tile.width % BLOCK != 0 || tile.height % BLOCK != 0 {
             for y in 0..rows * BLOCK {

@@ -1,6 +1,7 @@
 //! The program from the outside: arguments and files in, exit codes, files and text out.
 
 mod bad_input;
+mod bench;
 mod commands;
 mod render;
 #[cfg(target_os = "linux")]

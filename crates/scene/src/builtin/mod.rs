@@ -49,6 +49,11 @@ pub const NAMES: &[&str] = &[
     "walker",
 ];
 
+/// The scene `blob-*` of any size: one organic surface of `20 * frequency^2` triangles.
+pub fn blob_of(frequency: u32) -> Scene {
+    blob::blob("blob", frequency)
+}
+
 /// Makes a built-in scene.
 ///
 /// # Errors

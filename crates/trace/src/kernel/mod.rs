@@ -12,6 +12,7 @@ pub(crate) mod cluster;
 pub(crate) mod cube;
 pub(crate) mod edges;
 pub(crate) mod pixels;
+pub(crate) mod lambert;
 pub(crate) mod points;
 pub(crate) mod project;
 pub(crate) mod receivers;

@@ -1,0 +1,141 @@
+//! `rayward bench` at tiny sizes: counts, pictures and the form of the reports. No time is looked at.
+
+use crate::support::Folder;
+
+const TINY: [&str; 4] = ["--resolution", "96x60", "--runs", "1"];
+
+#[test]
+fn frames_of_all_contenders_agree() {
+    let folder = Folder::new();
+    let arguments = [
+        &["bench", "frames", "blob-1k", "courtyard", "--json", "-q"][..],
+        &TINY,
+    ]
+    .concat();
+    let run = folder
+        .run(&[&arguments[..], &["--pictures", "pictures"]].concat())
+        .expect(0);
+    let report = run.json();
+    assert_eq!(report["width"], 96);
+    assert!(report["machine"]["threads"] == 1 && report["machine"]["simd"].is_string());
+    let frames = report["frames"].as_array().expect("frames");
+    let kinds: Vec<_> = frames
+        .iter()
+        .map(|f| (f["scene"].as_str(), f["frame"].as_str()))
+        .collect();
+    let (blob, court) = (Some("blob-1k"), Some("courtyard"));
+    let (eye, hard) = (Some("eye"), Some("eye+hard"));
+    assert_eq!(kinds, [(blob, eye), (blob, hard), (court, eye), (court, hard)]);
+    let mut pictures = 0;
+    for frame in frames {
+        assert_eq!(frame["eye_rays"], 96 * 60);
+        let shadow_rays = frame["shadow_rays"].as_u64().expect("a number");
+        assert_eq!(shadow_rays > 0, frame["frame"] == "eye+hard");
+        let rows = frame["rows"].as_array().expect("rows");
+        // Rayward, and obvhs with two trees; Embree only where it is installed.
+        let names: Vec<_> = rows.iter().filter_map(|row| row["contender"].as_str()).collect();
+        assert!(names[0] == "rayward" && names.contains(&"obvhs, wide") && names.contains(&"obvhs, binary"));
+        pictures += rows.len();
+        for row in rows {
+            assert_eq!(row["same_picture"], true, "{row}");
+            assert!(row["times"]["cpu_ms"]["median"].is_number(), "{row}");
+            assert_eq!(row["kept_build_ms"].is_null(), row["ours"] == true, "{row}");
+        }
+        assert!(frame["ratio"].is_number());
+    }
+    let written = std::fs::read_dir(folder.path("pictures"))
+        .expect("a folder")
+        .count();
+    assert_eq!(written, pictures);
+}
+
+#[test]
+fn frames_have_a_table_and_rows() {
+    let folder = Folder::new();
+    let base = [
+        &["bench", "frames", "blob-1k", "--no-peers", "--frames", "eye"][..],
+        &TINY,
+    ]
+    .concat();
+    let run = folder.run(&base).expect(0);
+    let text = String::from_utf8(run.stdout).expect("text");
+    assert!(
+        text.contains("blob-1k, 980 triangles, eye: 5760 eye rays, 0 shadow rays"),
+        "{text}"
+    );
+    assert!(run.stderr.contains("blob-1k"), "progress");
+    let run = folder.run(&[&base[..], &["--csv", "-q"]].concat()).expect(0);
+    let csv = String::from_utf8(run.stdout).expect("text");
+    let lines: Vec<_> = csv.lines().collect();
+    assert_eq!(lines.len(), 2, "{csv}");
+    assert!(
+        lines[0].starts_with("scene,triangles,frame")
+            && lines[1].starts_with("blob-1k,980,eye,rayward,1,5760,0")
+    );
+    assert!(run.stderr.is_empty(), "{}", run.stderr);
+}
+
+#[test]
+fn scaling_and_builds_count_what_they_measure() {
+    let folder = Folder::new();
+    let arguments = [
+        "bench",
+        "scaling",
+        "--quick",
+        "--threads",
+        "2",
+        "--runs",
+        "1",
+        "--json",
+        "-q",
+    ];
+    let report = folder.run(&arguments).expect(0).json();
+    let curves = report["curves"].as_array().expect("curves");
+    let parameters: Vec<_> = curves.iter().filter_map(|c| c["parameter"].as_str()).collect();
+    assert_eq!(
+        parameters,
+        ["triangles", "pixels", "triangles", "pixels", "lights", "threads"]
+    );
+    let points = |i: usize| curves[i]["points"].as_array().expect("points");
+    assert_eq!(points(0)[1]["triangles"], 9680);
+    assert_eq!(points(0)[1]["rays"], 96 * 60);
+    assert_eq!(points(1)[0]["rays"], 64 * 40);
+    let rays = |point: usize| points(4)[point]["rays"].as_u64().expect("a number") - 96 * 60;
+    assert_eq!(rays(1), 2 * rays(0), "one shadow ray for each light");
+    assert_eq!(points(5).len(), 2);
+
+    let arguments = [&["bench", "build", "blob-4k", "--json", "-q"][..], &TINY].concat();
+    let report = folder.run(&arguments).expect(0).json();
+    let scene = &report["scenes"][0];
+    assert_eq!(
+        (&scene["scene"], &scene["triangles"]),
+        (&"blob-4k".into(), &3920.into())
+    );
+    assert!(scene["eye_references"].as_u64().is_some_and(|n| n > 1000));
+    for piece in ["eye_grid", "light_grid", "frame"] {
+        assert!(scene[piece]["speed_up"].is_number(), "{piece}");
+    }
+}
+
+#[test]
+fn what_cannot_be_measured_is_named() {
+    let folder = Folder::new();
+    folder.run(&["bench"]).expect(2);
+    folder
+        .run(&["bench", "frames", "castle", "-q"])
+        .expect(2)
+        .says(&["castle", "courtyard"]);
+    folder.run(&["bench", "frames", "--runs", "0"]).expect(2);
+    folder.file("broken.obj", "v 1 2\n");
+    folder
+        .run(&["bench", "frames", "broken.obj", "-q"])
+        .expect(3)
+        .says(&["broken.obj"]);
+    let missing = folder
+        .command(&[&["bench", "frames", "blob-1k", "-q"][..], &TINY].concat())
+        .env("RAYWARD_EMBREE", "no/such/library.so")
+        .output()
+        .expect("the program runs");
+    assert_eq!(missing.status.code(), Some(3));
+    assert!(String::from_utf8_lossy(&missing.stderr).contains("no/such/library.so"));
+}

@@ -1,0 +1,246 @@
+//! n . l to 8 bits: the plainest picture of a frame, for comparing casters with each other and for previews.
+//!
+//! A triangle shows the side that the eye sees. A pixel without a triangle is 0; a surface is 32 where no light
+//! reaches it, 255 where light falls on it upright.
+//!
+//! Layout: 4 bytes a triangle, filled when a pixel first sees the triangle; so the cost is that of what is seen.
+//! Values of pixels may differ by 1 between instruction sets: nothing is decided by them.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::kernel::lambert::{DARK, LambertFrame, LambertTile, lambert};
+use crate::view::{Arrangement, View};
+use crate::{Light, SimdLevel, Triangles};
+
+/// Pixels of a block: 4 x 4, pixel (x, y) in lane `y * 4 + x`.
+pub const BLOCK_LANES: usize = 16;
+
+/// Triangles as one light falls on them and one eye sees them.
+#[derive(Debug)]
+pub struct Facets<'a> {
+    triangles: Triangles<'a>,
+    light: Light,
+    view: View,
+    level: SimdLevel,
+    frame: LambertFrame,
+    /// Per triangle the bits of the light's distance from its plane, or of the cosine for a directional light:
+    /// positive on the side that the eye sees. All ones until it is asked for.
+    facets: Vec<AtomicU32>,
+}
+
+/// Closest triangles of a tile, in blocks of 4 x 4 pixels.
+pub trait HitBlocks {
+    /// Whether [`Self::block`] has depth, not nearness.
+    const DEPTH: bool;
+
+    /// Triangle ids, `u32::MAX` where nothing is seen, and nearness or depth of the pixels of a block.
+    fn block(&self, column: u32, row: u32) -> (&[u32; BLOCK_LANES], &[f32; BLOCK_LANES]);
+}
+
+/// Bits of a facet that nobody has asked for: a NaN that no arithmetic gives.
+const UNASKED: u32 = u32::MAX;
+
+impl<'a> Facets<'a> {
+    /// The facets of one frame. Nothing is computed yet.
+    pub fn new(view: View, light: Light, triangles: Triangles<'a>, level: SimdLevel) -> Self {
+        let center = view.center.as_dvec3();
+        let corner = view.ray(0.0, 0.0);
+        let (right, down) = (view.ray(1.0, 0.0), view.ray(0.0, 1.0));
+        let rows = |at: glam::DVec3, x: glam::DVec3, y: glam::DVec3| {
+            [at, x - at, y - at].map(|v| v.as_vec3().to_array())
+        };
+        let parallel = matches!(view.arrangement, Arrangement::Parallel { .. });
+        let frame = LambertFrame {
+            dir: rows(corner.dir, right.dir, down.dir),
+            origin: rows(
+                corner.origin - center,
+                right.origin - center,
+                down.origin - center,
+            ),
+            light: match light {
+                Light::Point(p) => Some((p - view.center).to_array()),
+                Light::Directional(_) => None,
+            },
+            reach: match view.arrangement {
+                Arrangement::Parallel { reach } => reach as f32,
+                Arrangement::Perspective => 0.0,
+            },
+            parallel,
+        };
+        let facets = (0..triangles.len()).map(|_| AtomicU32::new(UNASKED)).collect();
+        Self {
+            triangles,
+            light,
+            view,
+            level,
+            frame,
+            facets,
+        }
+    }
+
+    /// Distance of the light from a triangle's plane, positive if it is on the side that the eye sees; for a
+    /// directional light the cosine. 0 for triangles without area.
+    #[inline]
+    pub fn facet(&self, prim: u32) -> f32 {
+        let stored = &self.facets[prim as usize];
+        let bits = stored.load(Ordering::Relaxed);
+        if bits != UNASKED {
+            return f32::from_bits(bits);
+        }
+        let facet = self.compute(prim);
+        stored.store(facet.to_bits(), Ordering::Relaxed);
+        facet
+    }
+
+    #[cold]
+    fn compute(&self, prim: u32) -> f32 {
+        let [v0, ..] = self.triangles.corners(prim).map(glam::Vec3::as_dvec3);
+        let Some(normal) = self.triangles.normal(prim).try_normalize() else {
+            return 0.0;
+        };
+        let seen = match self.view.arrangement {
+            Arrangement::Perspective => (self.view.center.as_dvec3() - v0).dot(normal),
+            Arrangement::Parallel { .. } => -self.view.forward.dot(normal),
+        };
+        let facing = match self.light {
+            Light::Point(p) => (p.as_dvec3() - v0).dot(normal),
+            Light::Directional(d) => d.as_dvec3().normalize_or_zero().dot(normal),
+        };
+        (facing * seen.signum()) as f32
+    }
+
+    /// Shades the pixels of a tile whose first pixel is `corner`. `out` has one entry a block, in rows of `stride`.
+    pub fn shade<H: HitBlocks>(
+        &self,
+        hits: &H,
+        corner: [u32; 2],
+        stride: u32,
+        out: &mut [[u8; BLOCK_LANES]],
+    ) {
+        let depth = H::DEPTH;
+        let tile = LambertTile {
+            stride,
+            corner,
+            depth,
+        };
+        let (block, facet) = (|column, row| hits.block(column, row), |prim| self.facet(prim));
+        lambert(self.level, &self.frame, &tile, block, facet, out);
+    }
+}
+
+/// Takes from a shaded block what does not reach it of the light: `lit` of `samples` samples do.
+#[inline]
+pub fn darken(block: &mut [u8; BLOCK_LANES], lit: &[u8; BLOCK_LANES], samples: u8) {
+    let samples = u16::from(samples.max(1));
+    for (value, &lit) in block.iter_mut().zip(lit) {
+        let light = u16::from(value.saturating_sub(DARK as u8)) * u16::from(lit) / samples;
+        *value = (*value).min(DARK as u8) + light as u8;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::test_meshes::Mesh;
+    use crate::{EyeGrid, EyeGridOptions, TileHits, exact};
+
+    /// The picture by definition, in f64.
+    fn expected(view: &View, light: Light, triangles: &Triangles, x: u32, y: u32, prim: Option<u32>) -> f64 {
+        let Some(prim) = prim else { return 0.0 };
+        let ray = view.pixel_ray(x, y);
+        let hit = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)).expect("it is seen");
+        let point = ray.origin + ray.dir * hit.t;
+        let normal = triangles.normal(prim).normalize();
+        let normal = normal * -normal.dot(ray.dir).signum();
+        32.0 + 223.0 * normal.dot(light.towards(point).normalize()).max(0.0)
+    }
+
+    fn check(view: View, light: Light, level: SimdLevel) {
+        let mesh = Mesh::blob(12);
+        let triangles = mesh.triangles();
+        let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
+        let facets = Facets::new(view, light, triangles, level);
+        let mut hits = TileHits::default();
+        let mut bright = 0;
+        for index in 0..grid.tile_count() {
+            let tile = grid.tile(index);
+            grid.trace_tile(&tile, &mut hits);
+            let columns = tile.width.div_ceil(4);
+            let mut out = vec![[0; BLOCK_LANES]; (columns * tile.height.div_ceil(4)) as usize];
+            facets.shade(&hits, [tile.x, tile.y], columns, &mut out);
+            let mut again = out.clone();
+            facets.shade(
+                &ByDepth::of(&hits, &view, columns, out.len()),
+                [tile.x, tile.y],
+                columns,
+                &mut again,
+            );
+            let mut halved = out.clone();
+            halved
+                .iter_mut()
+                .for_each(|block| darken(block, &[4; BLOCK_LANES], 8));
+            for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+                let block = (y / 4 * columns + x / 4) as usize;
+                let lane = (y % 4 * 4 + x % 4) as usize;
+                let wanted = expected(&view, light, &triangles, tile.x + x, tile.y + y, hits.prim(x, y));
+                let half = if wanted > 0.0 { 16.0 + 0.5 * wanted } else { 0.0 };
+                for (value, wanted) in [
+                    (out[block][lane], wanted),
+                    (again[block][lane], wanted),
+                    (halved[block][lane], half),
+                ] {
+                    assert!(
+                        (f64::from(value) - wanted).abs() < 1.6,
+                        "{x} {y}: {value} for {wanted}"
+                    );
+                }
+                bright += u32::from(wanted > 128.0);
+            }
+        }
+        assert!(bright > 100, "{bright} pixels are bright");
+    }
+
+    /// The hits of a tile with their depth.
+    struct ByDepth {
+        columns: u32,
+        prim: Vec<[u32; BLOCK_LANES]>,
+        depth: Vec<[f32; BLOCK_LANES]>,
+    }
+
+    impl ByDepth {
+        fn of(hits: &TileHits, view: &View, columns: u32, count: usize) -> Self {
+            let depth = |nearness: f32| match view.arrangement {
+                Arrangement::Perspective => 1.0 / nearness,
+                Arrangement::Parallel { reach } => reach as f32 - nearness,
+            };
+            let blocks = (0..count as u32).map(|i| hits.block(i % columns, i / columns));
+            let (prim, depth) = blocks.map(|(prim, near)| (*prim, near.map(depth))).unzip();
+            Self { columns, prim, depth }
+        }
+    }
+
+    impl HitBlocks for ByDepth {
+        const DEPTH: bool = true;
+
+        fn block(&self, column: u32, row: u32) -> (&[u32; BLOCK_LANES], &[f32; BLOCK_LANES]) {
+            let i = (row * self.columns + column) as usize;
+            (&self.prim[i], &self.depth[i])
+        }
+    }
+
+    #[test]
+    fn every_level_shades_as_defined() {
+        let axes = [DVec3::X, DVec3::Y, DVec3::NEG_Z];
+        let eye = Vec3::new(0.2, -0.1, 4.0);
+        let perspective = View::perspective(eye, axes, [0.4, 0.3], [93, 70]);
+        let parallel = View::parallel(eye, axes, [1.6, 1.2], 20.0, [93, 70]);
+        for level in SimdLevel::available() {
+            for view in [perspective, parallel] {
+                check(view, Light::Point(Vec3::new(2.0, 3.0, 2.5)), level);
+                check(view, Light::Directional(Vec3::new(0.5, 1.0, 1.5)), level);
+            }
+        }
+    }
+}
