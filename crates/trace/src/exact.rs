@@ -19,11 +19,15 @@
 //! Cost: some 60 f64 operations when the filter decides. Limits: corners are rounded once, `a_i = fl(v_i - o)`;
 //! for f32 input whose exponents differ by less than 29 that is exact.
 
+mod filter;
+
 use glam::{DVec3, Vec3, Vec3Swizzles};
 use robust::{Coord3D, orient3d};
 
 use crate::determinant::determinant;
 use crate::{Light, Receiver, Triangles};
+
+pub(crate) use filter::Filter;
 
 /// An exact hit: parameters in f64.
 #[derive(Clone, Copy, Debug, PartialEq)]
