@@ -9,6 +9,7 @@
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | any ray | [`Bvh`] | general hierarchy |
 //! | any ray | [`Grid3`] in world space | the regular grid of HM08, Table 5 |
+//! | any ray | [`Ldc`] | VMV07 |
 //! | any ray, by definition right | [`BruteForce`] | [`exact`] |
 //!
 //! All of them give the same answers, bit for bit: whether a ray meets a triangle is one exact decision
@@ -29,6 +30,7 @@ mod faces;
 mod grid3;
 mod facets;
 mod kernel;
+pub mod ldc;
 mod light_grid;
 mod light_views;
 mod moving;
@@ -56,6 +58,7 @@ pub use grid3::{Grid3, RaySpan};
 pub use facets::{BLOCK_LANES, Facets, HitBlocks, darken};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
+pub use ldc::{Ldc, LdcOptions};
 pub use light_grid::{
     CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
 };

@@ -4,9 +4,10 @@ mod support;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use rayward_trace::ldc::{DepthFormat, Hierarchy};
 use rayward_trace::{
-    Accel, BruteForce, Bvh, Candidates, Counters, FaceOptions, Grid3, Hit, Light, PerspectiveGrids, Ray,
-    Receiver, Topology, Triangles,
+    Accel, BruteForce, Bvh, Candidates, Counters, FaceOptions, Grid3, Hit, Ldc, LdcOptions, Light,
+    PerspectiveGrids, Ray, Receiver, Topology, Triangles,
 };
 use support::meshes::{self, Mesh};
 use support::{Random, rays};
@@ -19,9 +20,14 @@ type Structure = (
 );
 
 // Brute force against itself only shows that its queries agree with each other.
-const STRUCTURES: [Structure; 9] = [
+const STRUCTURES: [Structure; 12] = [
     ("BruteForce", 300, |t| Box::new(BruteForce::new(t))),
     ("Bvh", 3000, |t| Box::new(Bvh::build(t))),
+    ("Ldc", 3000, |t| Box::new(Ldc::build(t, &deep_cube()))),
+    ("small Ldc", 3000, |t| Box::new(Ldc::build(t, &small_cube()))),
+    ("Ldc as the paper stores it", 3000, |t| {
+        Box::new(Ldc::build(t, &paper_cube()))
+    }),
     ("Grid3 in world", 3000, |t| Box::new(Grid3::in_world(t, None))),
     ("Grid3 of uneven cells", 600, |t| {
         Box::new(Grid3::in_world(t, Some([54, 7, 1])))
@@ -57,6 +63,33 @@ const STRUCTURES: [Structure; 9] = [
         Box::new(PerspectiveGrids::build(DVec3::NAN, t, &FaceOptions::default()))
     }),
 ];
+
+/// All levels of the pyramid.
+fn deep_cube() -> LdcOptions {
+    LdcOptions {
+        resolution: 200,
+        ..LdcOptions::default()
+    }
+}
+
+/// A cube in which many triangles share a texel.
+fn small_cube() -> LdcOptions {
+    LdcOptions {
+        resolution: 24,
+        depth: DepthFormat::U16,
+        hierarchy: Hierarchy::Flat,
+        ..LdcOptions::default()
+    }
+}
+
+/// 16-bit float depth and one level of tiles, but with the coverage that exact answers need.
+fn paper_cube() -> LdcOptions {
+    LdcOptions {
+        build: LdcOptions::default().build,
+        hierarchy: Hierarchy::Tiles { log2: [2, 4] },
+        ..LdcOptions::paper(100)
+    }
+}
 
 /// The first finite vertex, if there is one.
 fn some_vertex(triangles: &Triangles) -> DVec3 {

@@ -1,0 +1,114 @@
+//! Samples of the cube as they are stored, in three formats of depth.
+//!
+//! A sample is the plane of one triangle over one texel: depth at the texel's centre, two slopes, the triangle's id.
+//! Normal, colour and material follow from the id when a hit is shaded, as VMV07 defers shading; the geometric normal
+//! also from the slopes. 12 bytes with f32 depth, 8 with u16 or f16.
+
+use half::f16;
+
+use super::raster::Fragment;
+
+/// How depth is stored.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthFormat {
+    /// 16-bit float in [0, 1], as in VMV07: up to a quarter of a texel off at 1024 texels.
+    F16,
+    /// 16-bit fixed point: 1/128 of a texel off at 1024 texels.
+    U16,
+    /// 32-bit float.
+    #[default]
+    F32,
+}
+
+/// A stored depth. `scale` is the cube's size along the direction, in texels.
+pub(crate) trait Depth: Copy + Send + Sync {
+    fn stored(depth: f32, scale: f32) -> Self;
+    fn texels(self, scale: f32) -> f32;
+    /// Bound on the error of a stored depth, in texels.
+    fn error(scale: f32) -> f32;
+}
+
+impl Depth for f32 {
+    fn stored(depth: f32, _: f32) -> Self {
+        depth
+    }
+    #[inline(always)]
+    fn texels(self, _: f32) -> f32 {
+        self
+    }
+    fn error(scale: f32) -> f32 {
+        scale * f32::EPSILON
+    }
+}
+
+impl Depth for u16 {
+    fn stored(depth: f32, scale: f32) -> Self {
+        (depth / scale * f32::from(Self::MAX) + 0.5) as Self
+    }
+    #[inline(always)]
+    fn texels(self, scale: f32) -> f32 {
+        f32::from(self) * (scale / f32::from(Self::MAX))
+    }
+    fn error(scale: f32) -> f32 {
+        // Half a step and rounding; depths just below 0 are stored as 0.
+        scale / f32::from(Self::MAX) * 0.51 + scale * f32::EPSILON + 1.0 / 64.0
+    }
+}
+
+impl Depth for f16 {
+    fn stored(depth: f32, scale: f32) -> Self {
+        Self::from_f32(depth / scale)
+    }
+    #[inline(always)]
+    fn texels(self, scale: f32) -> f32 {
+        self.to_f32() * scale
+    }
+    fn error(scale: f32) -> f32 {
+        // Eleven bits of numbers up to 1.
+        scale / 4096.0 * 1.01 + scale * f32::EPSILON
+    }
+}
+
+/// One triangle's plane over one texel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Sample<D> {
+    pub(crate) prim: u32,
+    pub(crate) depth: D,
+    pub(crate) slopes: [i8; 2],
+}
+
+impl<D: Depth> Sample<D> {
+    pub(crate) fn of(fragment: &Fragment, prim: u32, scale: f32) -> Self {
+        Self {
+            prim,
+            depth: D::stored(fragment.depth, scale),
+            slopes: fragment.slopes,
+        }
+    }
+}
+
+/// All samples of one direction.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Samples {
+    F16(Vec<Sample<f16>>),
+    U16(Vec<Sample<u16>>),
+    F32(Vec<Sample<f32>>),
+}
+
+impl Samples {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::F16(s) => s.len(),
+            Self::U16(s) => s.len(),
+            Self::F32(s) => s.len(),
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
+        match self {
+            Self::F16(s) => size_of_val(&**s),
+            Self::U16(s) => size_of_val(&**s),
+            Self::F32(s) => size_of_val(&**s),
+        }
+    }
+}
