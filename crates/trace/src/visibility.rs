@@ -102,7 +102,7 @@ impl VisibleTile {
         let blocks = (0..rows).flat_map(|row| (0..stride).map(move |column| (column, row)));
         let mut prims: Vec<_> = blocks.map(|(column, row)| hits.block(column, row).prim).collect();
         // Blocks reach beyond the raster's edge.
-        if tile.width % BLOCK != 0 || tile.height % BLOCK != 0 {
+        if !tile.width.is_multiple_of(BLOCK) || !tile.height.is_multiple_of(BLOCK) {
             for y in 0..rows * BLOCK {
                 for x in 0..stride * BLOCK {
                     if x >= tile.width || y >= tile.height {

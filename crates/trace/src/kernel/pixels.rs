@@ -38,9 +38,9 @@ impl TileRays {
         (self.center, self.forward) = (view.center.as_dvec3(), view.forward);
         let split = |v: &dyn Fn(usize) -> DVec3| {
             let mut lanes = [[0.0; HALF]; 3];
-            for i in 0..HALF {
-                let v = v(i);
-                (lanes[0][i], lanes[1][i], lanes[2][i]) = (v.x, v.y, v.z);
+            let [x, y, z] = &mut lanes;
+            for (i, ((x, y), z)) in x.iter_mut().zip(y).zip(z).enumerate() {
+                [*x, *y, *z] = v(i).to_array();
             }
             lanes
         };

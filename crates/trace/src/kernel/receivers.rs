@@ -373,7 +373,7 @@ impl<S: Simd> CellReach<S> {
         let mut part = |axis: usize| {
             let low = (self.low[axis] + corner[axis]).max(self.min[axis]);
             let high = (self.high[axis] + corner[axis]).min(self.max[axis]);
-            reached = reached & (low - high).simd_le(splat(2.0 * SLACK));
+            reached &= (low - high).simd_le(splat(2.0 * SLACK));
             if self.grows[axis] { high } else { low }
         };
         let (x, y) = (part(0), part(1));
@@ -381,9 +381,9 @@ impl<S: Simd> CellReach<S> {
             let plane = splat(record.nearness_x)
                 .mul_add(x, splat(record.nearness_y).mul_add(y, splat(record.nearness)));
             let nearest = plane.min(self.nearest) * splat(1.0 + 2.0 * NEARNESS_BAND);
-            reached = reached & nearest.simd_ge(farthest);
+            reached &= nearest.simd_ge(farthest);
         } else {
-            reached = reached & farthest.simd_lt(splat(f32::INFINITY));
+            reached &= farthest.simd_lt(splat(f32::INFINITY));
         }
         reached.to_bitmask() as u32
     }
