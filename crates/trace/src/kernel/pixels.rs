@@ -6,7 +6,7 @@
 //!
 //! Cost: some 30 vector instructions for sixteen pixels and each of their triangles, and 100 to project them.
 
-use fearless_simd::{Simd, dispatch, f32x16, f64x8, mask64x8, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, f64x8, mask32x16, mask64x8, prelude::*, u32x16};
 use glam::{DVec3, Vec3, Vec3Swizzles};
 
 use super::project::project_half;
@@ -66,8 +66,11 @@ impl TileRays {
         let stride = self.columns.len();
         let [cx, cy, cz] = &self.columns[block % stride];
         let [rx, ry, rz] = &self.rows[block / stride * 2 + half];
-        let load = |lanes: &[f64; HALF]| f64x8::from_slice(simd, lanes);
-        [load(cx) + load(rx), load(cy) + load(ry), load(cz) + load(rz)]
+        [
+            f64x8::from_slice(simd, cx) + f64x8::from_slice(simd, rx),
+            f64x8::from_slice(simd, cy) + f64x8::from_slice(simd, ry),
+            f64x8::from_slice(simd, cz) + f64x8::from_slice(simd, rz),
+        ]
     }
 
     /// Directions in a perspective view.
@@ -360,27 +363,48 @@ fn project_block<S: Simd>(simd: S, view: &View, halves: &[[f64x8<S>; 3]; 2]) -> 
 #[inline(always)]
 fn cube_faces<S: Simd>(simd: S, center: DVec3, halves: &[[f64x8<S>; 3]; 2]) -> [u32; 6] {
     let [low, high] = halves;
-    let axis = |low: f64x8<S>, high: f64x8<S>, center: f64| {
-        let center = f64x8::splat(simd, center);
-        (low - center).narrow(high - center)
-    };
-    let x = axis(low[0], high[0], center.x);
-    let y = axis(low[1], high[1], center.y);
-    let z = axis(low[2], high[2], center.z);
+    let x = relative(simd, low[0], high[0], center.x);
+    let y = relative(simd, low[1], high[1], center.y);
+    let z = relative(simd, low[2], high[2], center.z);
     let largest = x.abs().max(y.abs()).max(z.abs());
     let mut rest = u32::MAX >> (32 - LANES);
     let mut of_face = [0; 6];
-    let mut take = |axis: usize, v: f32x16<S>| {
-        let along = v.abs().simd_ge(largest).to_bitmask() as u32 & rest;
-        let positive = v.simd_gt(f32x16::splat(simd, 0.0)).to_bitmask() as u32;
+    let zero = f32x16::splat(simd, 0.0);
+    let signs = [x.simd_gt(zero), y.simd_gt(zero), z.simd_gt(zero)];
+    let longest = [
+        x.abs().simd_ge(largest),
+        y.abs().simd_ge(largest),
+        z.abs().simd_ge(largest),
+    ];
+    for axis in 0..3 {
+        let along = longest[axis].to_bitmask() as u32 & rest;
+        let positive = signs[axis].to_bitmask() as u32;
         of_face[2 * axis] = along & positive;
         of_face[2 * axis + 1] = along & !positive;
         rest &= !along;
-    };
-    take(0, x);
-    take(1, y);
-    take(2, z);
+    }
     of_face
+}
+
+#[inline(always)]
+fn relative<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>, center: f64) -> f32x16<S> {
+    let center = f64x8::splat(simd, center);
+    (low - center).narrow(high - center)
+}
+
+#[inline(always)]
+fn within<S: Simd>(simd: S, v: f32x16<S>, size: u32) -> mask32x16<S> {
+    let end = f32x16::splat(simd, size as f32 + 1.0);
+    v.simd_ge(f32x16::splat(simd, -1.0)) & v.simd_le(end)
+}
+
+/// Column or row of light tiles.
+#[inline(always)]
+fn tile_index<S: Simd>(simd: S, v: f32x16<S>, tiles: u32) -> u32x16<S> {
+    let scaled = v * f32x16::splat(simd, 1.0 / LIGHT_TILE as f32);
+    let last = f32x16::splat(simd, tiles as f32 - 1.0);
+    let kept = scaled.max(f32x16::splat(simd, 0.0)).min(last);
+    kept.to_int::<u32x16<S>>()
 }
 
 /// Puts the points of a block into the light tiles of one face.
@@ -394,23 +418,19 @@ fn sort_block<S: Simd>(
     points: &mut Vec<BlockPoints>,
     entries: &mut Vec<Entry>,
 ) {
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let within = |v: f32x16<S>, size: u32| v.simd_ge(splat(-1.0)) & v.simd_le(splat(size as f32 + 1.0));
     // Elsewhere no caster can come before a point.
-    let seen = within(x, view.width) & within(y, view.height) & nearness.simd_gt(splat(0.0));
+    let ahead = nearness.simd_gt(f32x16::splat(simd, 0.0));
+    let seen = within(simd, x, view.width) & within(simd, y, view.height) & ahead;
     let mut left = seen.to_bitmask() as u32 & asked;
     if left == 0 {
         return;
     }
     let tiles = [view.width, view.height].map(|size| size / LIGHT_TILE);
-    let index = |v: f32x16<S>, tiles: u32| {
-        let scaled = (v * splat(1.0 / LIGHT_TILE as f32)).max(splat(0.0));
-        scaled.min(splat(tiles as f32 - 1.0)).to_int::<u32x16<S>>()
-    };
-    let (column, row) = (index(x, tiles[0]), index(y, tiles[1]));
+    let column = tile_index(simd, x, tiles[0]);
+    let row = tile_index(simd, y, tiles[1]);
     let tile = row * tiles[0] + column;
     let position = points.len() as u16;
-    let side = splat(LIGHT_TILE as f32);
+    let side = f32x16::splat(simd, LIGHT_TILE as f32);
     points.push(BlockPoints {
         x: (x - column.to_float::<f32x16<S>>() * side).into(),
         y: (y - row.to_float::<f32x16<S>>() * side).into(),
@@ -422,8 +442,10 @@ fn sort_block<S: Simd>(
         let first = tile_of[left.trailing_zeros() as usize];
         let same = tile.simd_eq(u32x16::splat(simd, first)).to_bitmask() as u32 & left;
         left &= !same;
-        let lanes = fearless_simd::mask32x16::from_bitmask(simd, u64::from(same));
-        let farthest = lanes.select(nearness, splat(f32::INFINITY)).reduce_min();
+        let lanes = mask32x16::from_bitmask(simd, u64::from(same));
+        let farthest = lanes
+            .select(nearness, f32x16::splat(simd, f32::INFINITY))
+            .reduce_min();
         entries.push(Entry {
             light_tile: face * tiles[0] * tiles[1] + first,
             eye_tile,

@@ -100,9 +100,7 @@ impl ReceiverTile {
         self.blocks = (wanted.ceil() as u32).clamp(BLOCKS[0], BLOCKS[1]);
         let cells = self.blocks * BLOCK;
         self.side = LIGHT_TILE as f32 / cells as f32;
-        let splat = |v: f32| f32x16::splat(simd, v);
-        let scale = splat(1.0 / self.side);
-        let last = splat((cells - 1) as f32);
+        let (scale, last) = (1.0 / self.side, (cells - 1) as f32);
         let count = (cells * cells) as usize;
         self.starts.clear();
         self.starts.resize(count + 1, 0);
@@ -110,11 +108,8 @@ impl ReceiverTile {
         self.cells.reserve(entries.len());
         for entry in entries {
             let points = points_of(entry);
-            let index = |v: &[f32; LANES]| {
-                let scaled = (f32x16::from_slice(simd, v) * scale).max(splat(0.0)).min(last);
-                scaled.to_int::<u32x16<S>>()
-            };
-            let (x, y) = (index(&points.x), index(&points.y));
+            let x = cell_index(simd, &points.x, scale, last);
+            let y = cell_index(simd, &points.y, scale, last);
             let block = (y >> 2) * self.blocks + (x >> 2);
             let cell: [u32; LANES] = (block * 16 + (y & 3) * 4 + (x & 3)).into();
             let mut lanes = u32::from(entry.lanes);
@@ -186,6 +181,27 @@ impl ReceiverTile {
     }
 }
 
+/// Column or row of cells of sixteen coordinates.
+#[inline(always)]
+fn cell_index<S: Simd>(simd: S, v: &[f32; LANES], scale: f32, last: f32) -> u32x16<S> {
+    let scaled = f32x16::from_slice(simd, v) * f32x16::splat(simd, scale);
+    let kept = scaled
+        .max(f32x16::splat(simd, 0.0))
+        .min(f32x16::splat(simd, last));
+    kept.to_int::<u32x16<S>>()
+}
+
+/// a x + b y + c. A function of its own, and not a closure, so that it is compiled for the caller's instruction set.
+#[inline(always)]
+fn plane<S: Simd>(simd: S, [a, b, c]: [f32; 3], x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+    let (a, b, c) = (
+        f32x16::splat(simd, a),
+        f32x16::splat(simd, b),
+        f32x16::splat(simd, c),
+    );
+    a.mul_add(x, b.mul_add(y, c))
+}
+
 /// Which triangle a receiver lies on.
 pub(crate) type OwnPrim<'p> = &'p (dyn Fn(u32) -> u32 + Sync);
 
@@ -249,18 +265,25 @@ impl CasterArea {
         nearest: f32::INFINITY,
     };
 
+    /// The caster in that lane; anywhere, if a corner does not lie in front.
     #[inline(always)]
-    fn of_lane(vertices: &VertexLanes, lane: usize, corner: [f32; 2]) -> Self {
+    pub(crate) fn of_lane(vertices: &VertexLanes, lane: usize, corner: [f32; 2]) -> Self {
         let range = |v: &[[f32; LANES]; 3], corner: f32| {
             let [a, b, c] = [v[0][lane] - corner, v[1][lane] - corner, v[2][lane] - corner];
             (a.min(b).min(c), a.max(b).max(c))
         };
         let (x, y) = (range(&vertices.x, corner[0]), range(&vertices.y, corner[1]));
         let n = &vertices.nearness;
+        let [a, b, c] = [n[0][lane], n[1][lane], n[2][lane]];
+        if !(a >= 0.0 && b >= 0.0 && c >= 0.0) {
+            return Self::ANYWHERE;
+        }
+        // Far outside of the raster a vertex has an order but no nearness.
+        let known = a > 0.0 && b > 0.0 && c > 0.0;
         Self {
             min: [x.0, y.0],
             max: [x.1, y.1],
-            nearest: n[0][lane].max(n[1][lane]).max(n[2][lane]),
+            nearest: if known { a.max(b).max(c) } else { f32::INFINITY },
         }
     }
 }
@@ -291,102 +314,90 @@ fn draw_impl<S: Simd>(
     if area.nearest * (1.0 + 2.0 * NEARNESS_BAND) < tile.least {
         return;
     }
-    let splat = |v: f32| f32x16::splat(simd, v);
     let block_side = tile.side * BLOCK as f32;
-    let last = tile.blocks - 1;
-    let block_range = |axis: usize| {
-        let index = |v: f32| (v.max(0.0) / block_side).min(last as f32) as u32;
-        index(area.min[axis] - SLACK)..=index(area.max[axis] + SLACK)
-    };
-    let reach = CellReach::new(simd, tile.side, record, area);
-    for by in block_range(1) {
-        for bx in block_range(0) {
-            let block = by * tile.blocks + bx;
-            let farthest = f32x16::from_slice(simd, &tile.farthest[block as usize]);
-            let corner = [splat(bx as f32 * block_side), splat(by as f32 * block_side)];
-            let mut cells = reach.cells(simd, record, corner, farthest);
+    let last = (tile.blocks - 1) as f32;
+    let (low, high) = (area.min, area.max);
+    let index = |v: f32| (v.max(0.0) / block_side).min(last) as u32;
+    for by in index(low[1] - SLACK)..=index(high[1] + SLACK) {
+        for bx in index(low[0] - SLACK)..=index(high[0] + SLACK) {
+            let block = (by * tile.blocks + bx) as usize;
+            let corner = [bx as f32 * block_side, by as f32 * block_side];
+            let farthest = &tile.farthest[block];
+            let mut cells = reached_cells(simd, tile.side, record, area, corner, farthest);
             while cells != 0 {
-                let cell = block * LANES as u32 + cells.trailing_zeros();
+                let cell = block * LANES + cells.trailing_zeros() as usize;
                 cells &= cells - 1;
-                draw_on_cell(simd, tile, record, cell as usize, own);
+                draw_on_cell(simd, tile, record, cell, own);
             }
         }
     }
 }
 
-/// A caster as it is held against sixteen cells at once.
-struct CellReach<S: Simd> {
-    /// Where in a cell, from its block's corner, each edge function is largest.
-    edge_x: [f32x16<S>; 3],
-    edge_y: [f32x16<S>; 3],
-    low: [f32x16<S>; 2],
-    high: [f32x16<S>; 2],
-    min: [f32x16<S>; 2],
-    max: [f32x16<S>; 2],
-    /// Whether nearness grows with x, with y.
-    grows: [bool; 2],
-    nearest: f32x16<S>,
+/// Column and row of a cell in its block.
+const COLUMN: [f32; LANES] = [
+    0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0,
+];
+const ROW: [f32; LANES] = [
+    0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0,
+];
+
+/// The cells of a block that a caster may reach before their farthest receiver. `corner` is the block's.
+#[inline(always)]
+fn reached_cells<S: Simd>(
+    simd: S,
+    side: f32,
+    record: &EdgeRecord,
+    area: &CasterArea,
+    corner: [f32; 2],
+    farthest: &[f32; LANES],
+) -> u32 {
+    // A point may be put into the neighbouring cell by rounding.
+    let (low, side) = (-SLACK, side + 2.0 * SLACK);
+    let step = side - 2.0 * SLACK;
+    let x_low = f32x16::from_slice(simd, &COLUMN)
+        .mul_add(f32x16::splat(simd, step), f32x16::splat(simd, corner[0] + low));
+    let y_low = f32x16::from_slice(simd, &ROW)
+        .mul_add(f32x16::splat(simd, step), f32x16::splat(simd, corner[1] + low));
+    let (x_high, y_high) = (
+        x_low + f32x16::splat(simd, side),
+        y_low + f32x16::splat(simd, side),
+    );
+
+    // Each edge function where it is largest in the cell.
+    let EdgeRecord { a, b, c, .. } = *record;
+    let edge_0 = corner_plane(simd, [a[0], b[0], c[0]], [x_low, x_high], [y_low, y_high]);
+    let edge_1 = corner_plane(simd, [a[1], b[1], c[1]], [x_low, x_high], [y_low, y_high]);
+    let edge_2 = corner_plane(simd, [a[2], b[2], c[2]], [x_low, x_high], [y_low, y_high]);
+    let inside = edge_0.min(edge_1).min(edge_2);
+
+    // The part of the cell that lies in the caster's rectangle, for its plane is known only there.
+    let x_low = x_low.max(f32x16::splat(simd, area.min[0]));
+    let x_high = x_high.min(f32x16::splat(simd, area.max[0]));
+    let y_low = y_low.max(f32x16::splat(simd, area.min[1]));
+    let y_high = y_high.min(f32x16::splat(simd, area.max[1]));
+    let slack = f32x16::splat(simd, 2.0 * SLACK);
+    let apart = (x_low - x_high).max(y_low - y_high).simd_gt(slack);
+
+    let slopes = [record.nearness_x, record.nearness_y, record.nearness];
+    let n = corner_plane(simd, slopes, [x_low, x_high], [y_low, y_high]);
+    // The floor is far above the plane's error. Written so that what is not a number is kept.
+    let bound = (n + f32x16::splat(simd, record.floor)).min(f32x16::splat(simd, area.nearest));
+    let bound = bound * f32x16::splat(simd, 1.0 + 2.0 * NEARNESS_BAND);
+    let hidden = bound.simd_lt(f32x16::from_slice(simd, farthest));
+    (!hidden & !apart & inside.simd_ge(f32x16::splat(simd, -1.01))).to_bitmask() as u32
 }
 
-impl<S: Simd> CellReach<S> {
-    #[inline(always)]
-    fn new(simd: S, side: f32, record: &EdgeRecord, area: &CasterArea) -> Self {
-        let splat = |v: f32| f32x16::splat(simd, v);
-        // A point may be put into the neighbouring cell by rounding, and into the border's from outside.
-        let (low, high) = (-SLACK, side + SLACK);
-        let x = f32x16::from_fn(simd, |i| (i % BLOCK as usize) as f32) * splat(side);
-        let y = f32x16::from_fn(simd, |i| (i / BLOCK as usize) as f32) * splat(side);
-        let ends = |v: f32x16<S>| (v + splat(low), v + splat(high));
-        let ((x_low, x_high), (y_low, y_high)) = (ends(x), ends(y));
-        let pick = |slope: f32, low: f32x16<S>, high: f32x16<S>| if slope > 0.0 { high } else { low };
-        Self {
-            edge_x: [
-                pick(record.a[0], x_low, x_high),
-                pick(record.a[1], x_low, x_high),
-                pick(record.a[2], x_low, x_high),
-            ],
-            edge_y: [
-                pick(record.b[0], y_low, y_high),
-                pick(record.b[1], y_low, y_high),
-                pick(record.b[2], y_low, y_high),
-            ],
-            low: [x_low, y_low],
-            high: [x_high, y_high],
-            min: [splat(area.min[0]), splat(area.min[1])],
-            max: [splat(area.max[0]), splat(area.max[1])],
-            grows: [record.nearness_x > 0.0, record.nearness_y > 0.0],
-            nearest: splat(area.nearest),
-        }
-    }
-
-    /// The cells of a block that the caster may reach before their farthest receiver.
-    #[inline(always)]
-    fn cells(&self, simd: S, record: &EdgeRecord, corner: [f32x16<S>; 2], farthest: f32x16<S>) -> u32 {
-        let splat = |v: f32| f32x16::splat(simd, v);
-        let edge = |i: usize| {
-            let (x, y) = (self.edge_x[i] + corner[0], self.edge_y[i] + corner[1]);
-            splat(record.a[i]).mul_add(x, splat(record.b[i]).mul_add(y, splat(record.c[i])))
-        };
-        let mut reached = edge(0).min(edge(1)).min(edge(2)).simd_ge(splat(-1.01));
-        let bounded = record.floor == 0.0 && record.ceiling == f32::INFINITY;
-        // The part of each cell that lies in the caster's rectangle, for its plane is known only there.
-        let mut part = |axis: usize| {
-            let low = (self.low[axis] + corner[axis]).max(self.min[axis]);
-            let high = (self.high[axis] + corner[axis]).min(self.max[axis]);
-            reached &= (low - high).simd_le(splat(2.0 * SLACK));
-            if self.grows[axis] { high } else { low }
-        };
-        let (x, y) = (part(0), part(1));
-        if bounded {
-            let plane = splat(record.nearness_x)
-                .mul_add(x, splat(record.nearness_y).mul_add(y, splat(record.nearness)));
-            let nearest = plane.min(self.nearest) * splat(1.0 + 2.0 * NEARNESS_BAND);
-            reached &= nearest.simd_ge(farthest);
-        } else {
-            reached &= farthest.simd_lt(splat(f32::INFINITY));
-        }
-        reached.to_bitmask() as u32
-    }
+/// The largest value of a x + b y + c over sixteen rectangles.
+#[inline(always)]
+fn corner_plane<S: Simd>(
+    simd: S,
+    coefficients: [f32; 3],
+    [x_low, x_high]: [f32x16<S>; 2],
+    [y_low, y_high]: [f32x16<S>; 2],
+) -> f32x16<S> {
+    let x = if coefficients[0] > 0.0 { x_high } else { x_low };
+    let y = if coefficients[1] > 0.0 { y_high } else { y_low };
+    plane(simd, coefficients, x, y)
 }
 
 /// Holds a caster against the receivers of one cell.
@@ -424,22 +435,28 @@ fn draw_on_cell<S: Simd>(simd: S, tile: &mut ReceiverTile, record: &EdgeRecord, 
 /// The receivers of a group that a caster may shadow, and those among them that it certainly shadows, unless it is their own triangle.
 #[inline(always)]
 fn cover<S: Simd>(simd: S, group: &Group, record: &EdgeRecord) -> (u32, u32) {
-    let splat = |v: f32| f32x16::splat(simd, v);
     let x = f32x16::from_slice(simd, &group.x);
     let y = f32x16::from_slice(simd, &group.y);
-    let plane = |a: f32, b: f32, c: f32| splat(a).mul_add(x, splat(b).mul_add(y, splat(c)));
-    let g = |i: usize| plane(record.a[i], record.b[i], record.c[i]);
-    let inside = g(0).min(g(1)).min(g(2));
-    let covered = inside.simd_ge(splat(-1.0));
+    let EdgeRecord { a, b, c, .. } = *record;
+    let inside = plane(simd, [a[0], b[0], c[0]], x, y)
+        .min(plane(simd, [a[1], b[1], c[1]], x, y))
+        .min(plane(simd, [a[2], b[2], c[2]], x, y));
+    let covered = inside.simd_ge(f32x16::splat(simd, -1.0));
     if covered.all_false() {
         return (0, 0);
     }
     let nearness = f32x16::from_slice(simd, &group.nearness);
-    let n = plane(record.nearness_x, record.nearness_y, record.nearness);
-    let vague = !(n.simd_ge(splat(record.floor)) & n.simd_le(splat(record.ceiling)));
-    let farther = n * splat(1.0 + NEARNESS_BAND);
+    let slopes = [record.nearness_x, record.nearness_y, record.nearness];
+    let n = plane(simd, slopes, x, y);
+    let (floor, ceiling) = (
+        f32x16::splat(simd, record.floor),
+        f32x16::splat(simd, record.ceiling),
+    );
+    let vague = !(n.simd_ge(floor) & n.simd_le(ceiling));
+    let farther = n * f32x16::splat(simd, 1.0 + NEARNESS_BAND);
     let possible = covered & (farther.simd_ge(nearness) | vague);
-    let nearer = n * splat(1.0 - NEARNESS_BAND);
-    let sure = possible & inside.simd_gt(splat(1.0)) & nearer.simd_gt(nearness) & !vague;
+    let nearer = n * f32x16::splat(simd, 1.0 - NEARNESS_BAND);
+    let certain = inside.simd_gt(f32x16::splat(simd, 1.0)) & !vague;
+    let sure = possible & certain & nearer.simd_gt(nearness);
     (possible.to_bitmask() as u32, sure.to_bitmask() as u32)
 }

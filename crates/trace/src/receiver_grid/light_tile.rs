@@ -60,13 +60,15 @@ impl FaceScene<'_> {
                 }
                 let mut bad = draw_casters(self.level, receivers, lanes, edges, (corner, rounding), &own);
                 while bad != 0 {
-                    let prim = batch[bad.trailing_zeros() as usize];
+                    let lane = bad.trailing_zeros() as usize;
+                    let prim = batch[lane];
                     bad &= bad - 1;
                     let corners = self.triangles.corners(prim);
                     if let Some(precise) = PreciseTriangle::new(self.view, corners) {
                         let reach = f64::from(2 * LIGHT_TILE);
                         let record = precise.record(prim, corner.map(f64::from), reach);
-                        draw_caster(self.level, receivers, &record, &CasterArea::ANYWHERE, &own);
+                        let area = CasterArea::of_lane(lanes, lane, corner);
+                        draw_caster(self.level, receivers, &record, &area, &own);
                     }
                 }
             }
