@@ -7,6 +7,7 @@
 //! | hard shadow rays of one light, from any points | [`PointLightGrid`] | HM08 §5.2 |
 //! | rays that nearly share an origin, and any other | [`PerspectiveGrids`] | HM08 §5.3 |
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
+//! | soft shadow rays of one light | [`AreaLightTree`] | HM08 §5.3, in a hierarchy |
 //! | any ray | [`Bvh`] | general hierarchy |
 //! | any ray | [`Grid3`] in world space | the regular grid of HM08, Table 5 |
 //! | any ray | [`Ldc`] | VMV07 |
@@ -19,6 +20,8 @@
 //! Positions are f32 in one local frame (the caller keeps its f64 origin). Units are the caller's.
 
 mod accel;
+mod area_light;
+mod area_tree;
 mod bins;
 pub mod brute;
 pub mod bvh;
@@ -39,6 +42,7 @@ mod precise;
 mod queries;
 mod ray;
 mod receiver_grid;
+mod samples;
 pub mod space;
 #[cfg(test)]
 mod test_meshes;
@@ -48,6 +52,8 @@ pub mod view;
 mod visibility;
 
 pub use accel::{Accel, BuildStats, Count, Counters};
+pub use area_light::AreaLight;
+pub use area_tree::{AreaCounts, AreaLightTree, AreaScratch};
 pub use bins::Binning;
 pub use brute::BruteForce;
 pub use bvh::Bvh;
@@ -67,6 +73,7 @@ pub use perspective_grids::PerspectiveGrids;
 pub use queries::Candidates;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use receiver_grid::{LightQuery, LitCounts, LitPixels};
+pub use samples::{MAX_SAMPLES, Samples};
 pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};

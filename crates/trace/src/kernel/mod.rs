@@ -7,15 +7,19 @@
 //! [`crate::exact`]. That is why fused multiply-adds are allowed here and the answers are still the same at every
 //! level.
 
+pub(crate) mod area;
 pub(crate) mod batch;
 pub(crate) mod cluster;
 pub(crate) mod cube;
 pub(crate) mod edges;
-pub(crate) mod pixels;
 pub(crate) mod lambert;
+pub(crate) mod light_points;
+pub(crate) mod lines;
+pub(crate) mod pixels;
 pub(crate) mod points;
 pub(crate) mod project;
 pub(crate) mod receivers;
+pub(crate) mod shaft;
 pub(crate) mod tile;
 
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*};
