@@ -2,7 +2,8 @@
 //!
 //! `eye`: grid built, closest triangle of every pixel found. `eye_and_hard_shadows`: the same, then every pixel told
 //! whether one light reaches it. `eye_and_looked_up_shadows`: the same by HM08's own way, the light's grid built and
-//! one shadow ray looked up from every pixel that sees a surface. No shading. Items are pixels and shadow rays.
+//! one shadow ray looked up from every pixel that sees a surface. `eye_and_soft_shadows`: eight samples of a square
+//! light. No shading. Items are pixels and shadow rays.
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` (a folder with `cameras.json`) where it is set. Run
 //! as a test (`cargo test --benches`) the raster is small.
@@ -12,12 +13,13 @@ use std::sync::Mutex;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use rayward::scene::{self, FrameGeometry, LoadOptions, PosedCamera, PosedLight};
+use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
-    Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions, LightQuery, LitPixels, PointLightGrid,
-    Receiver, ShadowScratch, SimdLevel, TileHits, View, Visibility, exact,
+    AreaLight, AreaLightTree, AreaScratch, Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions,
+    LightQuery, LitPixels, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits, View, Visibility,
+    exact,
 };
-use rayward::{CameraFrame, shadow_end, triangles};
+use rayward::{CameraFrame, FramePlan, RenderOptions, shadow_end, triangles};
 
 fn main() {
     rayon::ThreadPoolBuilder::new()
@@ -65,6 +67,8 @@ struct Frame {
     clusters: Clusters,
     camera: PosedCamera,
     light: PosedLight,
+    /// The light with a size.
+    area: AreaLight,
 }
 
 /// The scene of that name; the last one is kept, for benchmarks of one scene follow each other.
@@ -81,12 +85,14 @@ fn load(name: &str) -> Frame {
     let Some(mesh) = name.strip_suffix(".ply") else {
         let geometry = scene::builtin::build(name).expect("a built-in scene").at(0.0);
         let (camera, light) = (geometry.cameras[0].clone(), geometry.lights[0].clone());
+        let area = area(&geometry, square_at(&light, &geometry));
         return Frame {
             name: name.into(),
             clusters: Clusters::new(&triangles(&geometry)),
             geometry,
             camera,
             light,
+            area,
         };
     };
     let folder = std::env::var_os("RAYWARD_SCENES").expect("checked");
@@ -97,13 +103,39 @@ fn load(name: &str) -> Frame {
     let geometry = scene::load(&file, &LoadOptions::default())
         .expect("a mesh")
         .at(0.0);
+    let mut lights = entry.lights();
+    let area = area(&geometry, lights.pop().expect("an area light"));
     Frame {
         name: name.into(),
         clusters: Clusters::new(&triangles(&geometry)),
         geometry,
         camera: entry.camera(),
-        light: entry.lights().remove(0),
+        light: lights.pop().expect("a point light"),
+        area,
     }
+}
+
+fn area(geometry: &FrameGeometry, light: PosedLight) -> AreaLight {
+    let plan = FramePlan::new(geometry, &[light], &RenderOptions::default());
+    let area = plan.lights[0].as_ref().and_then(|light| light.area);
+    area.expect("a light with a size")
+}
+
+/// A square in the place of a light of a built-in scene, a tenth of its distance wide, that faces the scene's middle.
+fn square_at(light: &PosedLight, geometry: &FrameGeometry) -> PosedLight {
+    let (low, high) = geometry.bounds().expect("triangles");
+    let middle = geometry.origin + (low + high).as_dvec3() * 0.5;
+    let position = match light.kind {
+        LightKind::Directional { .. } => middle - light.direction * f64::from((high - low).length()),
+        _ => light.position,
+    };
+    let mut square = scene::point_light_for(position, middle);
+    let side = (position.distance(middle) * 0.1) as f32;
+    square.kind = LightKind::Rectangle {
+        width: side,
+        height: side,
+    };
+    square
 }
 
 fn view(frame: &Frame) -> View {
@@ -112,8 +144,9 @@ fn view(frame: &Frame) -> View {
     camera.view(&frame.geometry)
 }
 
-/// Closest triangles of all pixels, given to `see` tile by tile as receivers.
-fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver])) {
+/// Closest triangles of all pixels, given to `see` tile by tile as receivers with their pixels, blocks of 8 x 8
+/// pixels and in these squares of 4 x 4 together.
+fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver], &[u32])) {
     let triangles = triangles(&frame.geometry);
     let grid = EyeGrid::build_clustered(
         view(frame),
@@ -122,20 +155,28 @@ fn trace(frame: &Frame, mut see: impl FnMut(&[Receiver])) {
         EyeGridOptions::default(),
         SimdLevel::detect(),
     );
-    let (mut hits, mut receivers) = (TileHits::default(), Vec::new());
+    let (mut hits, mut receivers, mut pixels) = (TileHits::default(), Vec::new(), Vec::new());
     for index in 0..grid.tile_count() {
         let tile = grid.tile(index);
         grid.trace_tile(&tile, &mut hits);
         receivers.clear();
-        for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+        pixels.clear();
+        let blocks = (0..tile.height).step_by(8);
+        let blocks = blocks.flat_map(|y| (0..tile.width).step_by(8).map(move |x| (x, y)));
+        let squares = blocks.flat_map(|(x, y)| (0..4).map(move |i| (x + i % 2 * 4, y + i / 2 * 4)));
+        for (x, y) in squares.flat_map(|(x, y)| (0..16).map(move |i| (x + i % 4, y + i / 4))) {
+            if x >= tile.width || y >= tile.height {
+                continue;
+            }
             let Some(prim) = hits.prim(x, y) else { continue };
             let ray = grid.view().pixel_ray(tile.x + x, tile.y + y);
             if let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)) {
                 let (point, error) = (ray.origin + ray.dir * hit.t, hit.t * 1e-12);
                 receivers.push(Receiver { point, error, prim });
+                pixels.push((tile.y + y) * grid.view().width + tile.x + x);
             }
         }
-        see(&receivers);
+        see(&receivers, &pixels);
     }
 }
 
@@ -189,15 +230,34 @@ fn eye_and_looked_up_shadows(bencher: Bencher, name: &str) {
     with_frame(name, |frame| {
         let light = shadow_end(&frame.light, frame.geometry.origin);
         let (mut asked, view) = (0, view(frame));
-        trace(frame, |receivers| asked += receivers.len());
+        trace(frame, |receivers, _| asked += receivers.len());
         let rays = (view.width * view.height) as usize + asked;
         bencher.counter(ItemsCount::new(rays)).bench_local(|| {
             let (triangles, options) = (triangles(&frame.geometry), LightGridOptions::default());
             let grid =
                 PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
             let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
-            trace(frame, |receivers| {
+            trace(frame, |receivers, _| {
                 grid.shadowed(receivers, &mut scratch, &mut shadow);
+            });
+            scratch.counts
+        });
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_soft_shadows(bencher: Bencher, name: &str) {
+    with_frame(name, |frame| {
+        let (mut asked, view) = (0, view(frame));
+        trace(frame, |receivers, _| asked += receivers.len());
+        let samples = Samples::new(8, 0);
+        let rays = (view.width * view.height) as usize + asked * samples.count() as usize;
+        bencher.counter(ItemsCount::new(rays)).bench_local(|| {
+            let triangles = triangles(&frame.geometry);
+            let tree = AreaLightTree::build(frame.area, triangles, &|_| Casts::Both, SimdLevel::detect());
+            let (mut scratch, mut visible) = (AreaScratch::default(), Vec::new());
+            trace(frame, |receivers, pixels| {
+                tree.visible(receivers, pixels, &samples, &mut scratch, &mut visible);
             });
             scratch.counts
         });

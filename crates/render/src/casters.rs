@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 use rayward_scene::{AlphaMode, FrameGeometry, Scene};
-use rayward_trace::{Casts, Light, Topology};
+use rayward_trace::{AreaLight, Casts, Light, Topology, Triangles};
 
 use crate::CasterPolicy;
 use crate::geometry::triangles;
@@ -65,15 +65,46 @@ impl<'t> CasterRules<'t> {
     /// What each triangle casts in this light.
     pub fn for_light(&self, geometry: &FrameGeometry, light: &Light) -> impl Fn(u32) -> Casts + Sync {
         let triangles = triangles(geometry);
-        let back_faces_suffice: Vec<bool> = (0..self.candidates.len() as u32)
-            .map(|c| {
-                self.candidates[c as usize]
-                    && match *light {
-                        Light::Directional(_) => true,
-                        Light::Point(p) => self.topology.winding_number(&triangles, c, p.as_dvec3()) == 0,
-                    }
-            })
-            .collect();
+        let outside = |c: u32| match *light {
+            Light::Directional(_) => true,
+            Light::Point(p) => self.topology.winding_number(&triangles, c, p.as_dvec3()) == 0,
+        };
+        self.rule(self.components_where(outside))
+    }
+
+    /// What each triangle casts in a light with a size: as in that of each of its points, with none of which a
+    /// component differs unless its surface passes through the light.
+    pub fn for_area(&self, geometry: &FrameGeometry, light: &AreaLight) -> impl Fn(u32) -> Casts + Sync {
+        let triangles = triangles(geometry);
+        let mut touched = vec![false; self.candidates.len()];
+        if let Some([low, high]) = light.bounds() {
+            let components = &self.topology.component_of_triangle;
+            for (prim, &component) in components.iter().enumerate() {
+                let [a, b, c] = triangles.corners(prim as u32);
+                let apart = a.min(b).min(c).cmpgt(high) | a.max(b).max(c).cmplt(low);
+                if let Some(touched) = touched.get_mut(component as usize).filter(|_| !apart.any()) {
+                    *touched = true;
+                }
+            }
+        }
+        let outside = |c: u32| {
+            !touched[c as usize]
+                && light.bounds().is_none_or(|[low, high]| {
+                    let middle = (low.as_dvec3() + high.as_dvec3()) * 0.5;
+                    self.topology.winding_number(&triangles, c, middle) == 0
+                })
+        };
+        self.rule(self.components_where(outside))
+    }
+
+    /// For each component whether it is a candidate of which this holds.
+    fn components_where(&self, outside: impl Fn(u32) -> bool) -> Vec<bool> {
+        (0..self.candidates.len() as u32)
+            .map(|c| self.candidates[c as usize] && outside(c))
+            .collect()
+    }
+
+    fn rule(&self, back_faces_suffice: Vec<bool>) -> impl Fn(u32) -> Casts + Sync {
         move |prim| {
             if self.is_transparent(prim) {
                 return Casts::Nothing;

@@ -5,7 +5,7 @@ use rayward_trace::SimdLevel;
 
 use crate::{Layers, Lens};
 
-/// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with hard shadows.
+/// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with shadows.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderOptions {
     /// Width of the picture in pixels.
@@ -25,10 +25,14 @@ pub struct RenderOptions {
     pub pixel_samples: u32,
     /// The lens of the camera; `None` is a pinhole, before which all is sharp.
     pub lens: Option<Lens>,
+    /// Samples of a light with a size, for each surface a pixel sees: from 1 to [`rayward_trace::MAX_SAMPLES`].
+    pub samples: u32,
+    /// Chooses the samples. The same seed gives the same picture.
+    pub seed: u32,
     /// Layers to keep besides the colour.
     pub layers: Layers,
     /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
-    /// back faces alone as casters.
+    /// back faces alone as casters, lights with a size shaded from their middle times the share of samples seen.
     pub paper: bool,
     /// Instruction set of the kernels; the picture does not depend on it.
     pub level: SimdLevel,
@@ -45,6 +49,8 @@ impl Default for RenderOptions {
             background: Vec3::new(0.44, 0.54, 0.68),
             pixel_samples: 1,
             lens: None,
+            samples: 8,
+            seed: 0,
             layers: Layers::default(),
             paper: false,
             level: SimdLevel::detect(),

@@ -5,11 +5,12 @@
 //! |---|---|
 //! | eye rays | one tiled perspective grid (HM08 §5.1) |
 //! | shadow rays of a light | one perspective grid each (HM08 §5.2) |
+//! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3) |
 //! | what lies behind masked and blended surfaces | a hierarchy, if there are any |
 
 use glam::DVec3;
 use rayward_scene::{FrameGeometry, LightKind, PosedLight};
-use rayward_trace::{Cone, EyeGridOptions, Light, LightGridOptions};
+use rayward_trace::{AreaLight, Cone, EyeGridOptions, Light, LightGridOptions};
 
 use crate::RenderOptions;
 use crate::geometry::shadow_end;
@@ -32,13 +33,15 @@ pub struct LightPlan {
     pub light: Light,
     /// Parameters of its grid.
     pub grid: LightGridOptions,
+    /// The light with its size, if it has one: it then has a tree instead of a grid.
+    pub area: Option<AreaLight>,
 }
 
 /// A spot light wider than this gets the faces of a point light, radians.
 const WIDEST_CONE: f32 = 1.2;
 
 impl FramePlan {
-    /// The plan for these lights. Area lights cast the hard shadow of their centre.
+    /// The plan for these lights.
     pub fn new(geometry: &FrameGeometry, lights: &[PosedLight], options: &RenderOptions) -> Self {
         let eye = if options.paper {
             EyeGridOptions::paper()
@@ -62,6 +65,7 @@ impl FramePlan {
                 name: light.name.clone(),
                 light: shadow_end(light, geometry.origin),
                 grid: LightGridOptions { cone, ..grid },
+                area: area_light(light, geometry.origin),
             }
         };
         let lights = lights
@@ -69,5 +73,33 @@ impl FramePlan {
             .map(|light| options.shadows.then(|| plan(light)))
             .collect();
         Self { eye, lights }
+    }
+}
+
+/// A light's size in the local frame; `None` for a point and a single direction.
+fn area_light(light: &PosedLight, origin: DVec3) -> Option<AreaLight> {
+    let center = (light.position - origin).as_vec3();
+    // In the order in which they turn towards where the light shines.
+    let turned = light.axis_y.cross(light.axis_x).dot(light.direction) < 0.0;
+    let half = |x: f32, y: f32| {
+        let [x, y] = [light.axis_x * f64::from(x), light.axis_y * f64::from(y)].map(|v| v.as_vec3());
+        if turned { [x, y] } else { [y, x] }
+    };
+    match light.kind {
+        LightKind::Rectangle { width, height } if width > 0.0 && height > 0.0 => {
+            let [u, v] = half(width * 0.5, height * 0.5);
+            Some(AreaLight::rectangle(center, u, v))
+        }
+        LightKind::Disk { radius } if radius > 0.0 => {
+            let [u, v] = half(radius, radius);
+            Some(AreaLight::disk(center, u, v))
+        }
+        LightKind::Point { radius } | LightKind::Spot { radius, .. } if radius > 0.0 => {
+            Some(AreaLight::sphere(center, radius))
+        }
+        LightKind::Directional { half_angle } if half_angle > 0.0 => {
+            Some(AreaLight::sun((-light.direction).as_vec3(), half_angle))
+        }
+        _ => None,
     }
 }

@@ -3,11 +3,14 @@
 use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
-use rayward_trace::{Bvh, Clusters, EyeGrid, Light, LightQuery, LitPixels, PointLightGrid, Tile, View, Visibility};
+use rayward_trace::{
+    AreaLightTree, Bvh, Clusters, EyeGrid, Light, LightQuery, LitPixels, PointLightGrid, SimdLevel, Tile,
+    View, Visibility,
+};
 
 use crate::casters::CasterRules;
 use crate::geometry::triangles;
-use crate::plan::FramePlan;
+use crate::plan::{FramePlan, LightPlan};
 use crate::tile::TileCounts;
 use crate::{RenderOptions, StructureStats};
 
@@ -35,6 +38,8 @@ pub enum LightShadows<'g> {
     Grid(PointLightGrid<'g>),
     /// For all pixels at once, before they are shaded.
     Pixels(LitPixels),
+    /// By samples of its area.
+    Area(AreaLightTree<'g>),
 }
 
 impl<'g> FrameStructures<'g> {
@@ -67,7 +72,8 @@ impl<'g> FrameStructures<'g> {
         });
 
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
-        let at_once = plan.lights.iter().any(Option::is_some) && !rules.any_transparent() && !options.paper;
+        let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(|p| p.area.is_none());
+        let at_once = plan.lights.iter().any(hard) && !rules.any_transparent() && !options.paper;
         let visibility = at_once.then(|| {
             let start = Instant::now();
             let visibility = Visibility::trace(&eye, &|| ());
@@ -87,31 +93,13 @@ impl<'g> FrameStructures<'g> {
                 lights.push(LightShadows::Nothing);
                 continue;
             };
-            let start = Instant::now();
-            let rule = rules.for_light(geometry, &plan.light);
-            let query = LightQuery {
-                light: plan.light,
-                cone: plan.grid.cone,
-                eye: eye_point,
-                rule: &rule,
-            };
-            let shadows = match &visibility {
-                Some(visibility) => {
-                    LightShadows::Pixels(LitPixels::find(visibility, &triangles, &query, options.level))
-                }
-                None => LightShadows::Grid(PointLightGrid::build(
-                    plan.light,
-                    triangles,
-                    &rule,
-                    plan.grid,
-                    options.level,
-                )),
-            };
             let name = if plan.name.is_empty() {
                 i.to_string()
             } else {
                 format!("{:?}", plan.name)
             };
+            let start = Instant::now();
+            let shadows = shadows_of(plan, visibility.as_ref(), geometry, rules, eye_point, options.level);
             stats.push(shadows.stats(&name, start));
             lights.push(shadows);
         }
@@ -159,6 +147,37 @@ impl<'g> FrameStructures<'g> {
     }
 }
 
+/// Builds what tells the shadows of one light.
+fn shadows_of<'g>(
+    plan: &LightPlan,
+    visibility: Option<&Visibility>,
+    geometry: &'g FrameGeometry,
+    rules: &CasterRules,
+    eye: Light,
+    level: SimdLevel,
+) -> LightShadows<'g> {
+    let triangles = triangles(geometry);
+    if let Some(area) = plan.area {
+        let rule = rules.for_area(geometry, &area);
+        return LightShadows::Area(AreaLightTree::build(area, triangles, &rule, level));
+    }
+    let rule = rules.for_light(geometry, &plan.light);
+    match visibility {
+        Some(visibility) => {
+            let query = LightQuery {
+                light: plan.light,
+                cone: plan.grid.cone,
+                eye,
+                rule: &rule,
+            };
+            LightShadows::Pixels(LitPixels::find(visibility, &triangles, &query, level))
+        }
+        None => LightShadows::Grid(PointLightGrid::build(
+            plan.light, triangles, &rule, plan.grid, level,
+        )),
+    }
+}
+
 impl LightShadows<'_> {
     fn stats(&self, name: &str, start: Instant) -> StructureStats {
         let (what, bytes, cells, references) = match self {
@@ -174,6 +193,12 @@ impl LightShadows<'_> {
                 counts.bytes,
                 counts.light_tiles as usize,
                 counts.references as usize,
+            ),
+            Self::Area(tree) => (
+                "area light tree",
+                tree.bytes(),
+                tree.node_count(),
+                tree.reference_count(),
             ),
         };
         StructureStats {

@@ -1,11 +1,15 @@
 //! One tile: eye hits, surfaces, shadows light by light, colours (HM08 §3: eye rays drive everything, shadow
 //! rays are spawned for a tile of hits at a time).
 
+mod soft;
+
 use std::ops::ControlFlow;
 
 use glam::{Vec2, Vec3};
 use rayward_scene::FrameGeometry;
-use rayward_trace::{Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay, exact};
+use rayward_trace::{
+    AreaCounts, AreaScratch, Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay, exact,
+};
 
 use crate::geometry::triangles;
 use crate::plan::LightPlan;
@@ -36,6 +40,9 @@ pub(crate) struct TileWork {
     asked: Vec<(u32, Vec3)>,
     shadow: Vec<bool>,
     scratch: ShadowScratch,
+    pixels: Vec<u32>,
+    visible: Vec<u32>,
+    area: AreaScratch,
     layers: Vec<(f64, u32)>,
     filters: Vec<u32>,
 }
@@ -69,6 +76,17 @@ impl TileCounts {
     }
 }
 
+/// The pixels of a tile in squares of 8 x 8, and within these of 4 x 4: those that follow each other see surfaces close
+/// to each other.
+fn in_blocks(width: u32, height: u32) -> impl Iterator<Item = [u32; 2]> {
+    let blocks = (0..height)
+        .step_by(8)
+        .flat_map(move |y| (0..width).step_by(8).map(move |x| [x, y]));
+    let squares = blocks.flat_map(|[x, y]| (0..4).map(move |i| [x + i % 2 * 4, y + i / 2 * 4]));
+    let pixels = squares.flat_map(|[x, y]| (0..16).map(move |i| [x + i % 4, y + i / 4]));
+    pixels.filter(move |[x, y]| *x < width && *y < height)
+}
+
 /// Layers less visible than this are left out.
 const INVISIBLE: f32 = 1.0 / 512.0;
 
@@ -82,22 +100,24 @@ impl TileShader<'_> {
         }
         work.points.clear();
         work.scratch.counts = rayward_trace::ShadowCounts::default();
-        for y in 0..tile.height {
-            for x in 0..tile.width {
-                let sample = self.see(&tile, [x, y], work);
-                out.put(x, y, &sample);
-            }
+        work.area.counts = AreaCounts::default();
+        for [x, y] in in_blocks(tile.width, tile.height) {
+            let sample = self.see(&tile, [x, y], work);
+            out.put(x, y, &sample);
         }
         for light in 0..self.lights.len() {
-            self.illuminate(light, index, work);
+            match &self.structures.lights[light] {
+                LightShadows::Area(tree) => self.illuminate_softly(light, tree, &tile, work),
+                _ => self.illuminate(light, index, work),
+            }
         }
         for point in &work.points {
             out.color_row(point.y)[point.x as usize] += point.color * point.weight;
         }
         TileCounts {
-            shadow_rays: work.scratch.counts.receivers,
+            shadow_rays: work.scratch.counts.receivers + work.area.counts.samples,
             exact_pixels: if traced { 0 } else { work.hits.exact_pixels as u64 },
-            lit_by_cell: work.scratch.counts.lit_by_cell,
+            lit_by_cell: work.scratch.counts.lit_by_cell + work.area.counts.untested,
         }
     }
 
@@ -224,7 +244,7 @@ impl TileShader<'_> {
         }
         match &self.structures.lights[light] {
             LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
-            LightShadows::Nothing | LightShadows::Pixels(_) => {
+            LightShadows::Nothing | LightShadows::Pixels(_) | LightShadows::Area(_) => {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
             }

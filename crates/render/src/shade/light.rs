@@ -1,10 +1,15 @@
 //! Lights prepared for one frame: positions in the local frame, distributions as a scale and an offset.
 //!
-//! Units are those of `KHR_lights_punctual`: candela for point and spot lights, lux for directional ones. Area
-//! lights have a radiance in nits and shine here from their centre, with the cosine at the light.
+//! Units are those of `KHR_lights_punctual`: candela for point and spot lights, lux for directional ones; rectangles and
+//! disks have a radiance in nits. A sample of a light with a size is a small light with the power of the whole
+//! ([`ShadingLight::incident_from`]): of a rectangle or disk with the cosine at the light, of a sphere as the disk that
+//! its outline spans, which has the sphere's radiance, candela over the area of its cross section.
+
+use std::f32::consts::PI;
 
 use glam::{DVec3, Vec3};
 use rayward_scene::{LightKind, PosedLight};
+use rayward_trace::{AreaLight, Light};
 
 /// What arrives at a point from one light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,6 +33,8 @@ pub struct ShadingLight {
     power: Vec3,
     /// 1 / range^2, 0 without a range.
     inverse_range2: f32,
+    /// Of a sphere; 0 for others.
+    radius: f32,
     distribution: Distribution,
 }
 
@@ -61,7 +68,7 @@ impl ShadingLight {
                 )
             }
             LightKind::Rectangle { width, height } => (Distribution::Cosine, width * height),
-            LightKind::Disk { radius } => (Distribution::Cosine, std::f32::consts::PI * radius * radius),
+            LightKind::Disk { radius } => (Distribution::Cosine, PI * radius * radius),
         };
         let has_range = light.range > 0.0 && light.range.is_finite();
         Self {
@@ -72,6 +79,10 @@ impl ShadingLight {
                 1.0 / (light.range * light.range)
             } else {
                 0.0
+            },
+            radius: match light.kind {
+                LightKind::Point { radius } | LightKind::Spot { radius, .. } => radius,
+                _ => 0.0,
             },
             distribution,
         }
@@ -87,7 +98,38 @@ impl ShadingLight {
                 radiance: self.power,
             });
         }
-        let offset = self.position - point;
+        self.incident_at(self.position, point)
+    }
+
+    /// What arrives at a point from a sample of the light's surface, as if all of the light were like it.
+    #[inline]
+    pub fn incident_from(&self, area: &AreaLight, sample: &Light, point: Vec3) -> Option<Incident> {
+        let position = match *sample {
+            Light::Directional(direction) => {
+                return Some(Incident {
+                    towards: direction.try_normalize()?,
+                    distance: f32::INFINITY,
+                    radiance: self.power,
+                });
+            }
+            Light::Point(position) => position,
+        };
+        let mut incident = self.incident_at(position, point)?;
+        if self.radius > 0.0 {
+            let axis = (point - self.position).normalize_or_zero();
+            let share = area.area_towards(point.as_dvec3()) / (PI * self.radius * self.radius);
+            // From inside, the sphere is a point.
+            if share > 0.0 {
+                incident.radiance *= share * -incident.towards.dot(axis);
+            }
+        }
+        Some(incident)
+    }
+
+    /// What arrives at a point from the light if it stood at `position`.
+    #[inline]
+    fn incident_at(&self, position: Vec3, point: Vec3) -> Option<Incident> {
+        let offset = position - point;
         let distance2 = offset.length_squared();
         let distance = distance2.sqrt();
         if distance2 == 0.0 {
@@ -207,6 +249,6 @@ mod tests {
         let slanted = irradiance(&rectangle, Vec3::new(2.0, 0.0, 0.0));
         assert!((slanted - 1.0 / 2f32.sqrt()).abs() < 1e-6, "8 cos 45 / 8");
         let disk = light(LightKind::Disk { radius: 1.0 }, f32::INFINITY);
-        assert!((irradiance(&disk, Vec3::ZERO) - 2.0 * std::f32::consts::PI).abs() < 1e-5);
+        assert!((irradiance(&disk, Vec3::ZERO) - 2.0 * PI).abs() < 1e-5);
     }
 }

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! The model is glTF 2.0's (appendix B), see [`brdf`]; lights are those of `KHR_lights_punctual` in their units.
-//! Area lights stand for a point light at their centre here. Transmission is not shaded: glass looks like the
+//! Lights with a size are sampled ([`direct_from`]); [`direct`] takes them for a point at their middle. Transmission is not shaded: glass looks like the
 //! diffuse base it is coated on.
 //!
 //! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
@@ -16,6 +16,7 @@ mod light;
 mod surface;
 
 use glam::Vec3;
+use rayward_trace::{AreaLight, Light};
 
 pub use light::{Incident, ShadingLight};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
@@ -27,7 +28,26 @@ pub fn direct(surface: &Surface, light: &ShadingLight) -> Option<Incident> {
     if surface.unlit {
         return None;
     }
-    let mut incident = light.incident(surface.position)?;
+    reflected(surface, light.incident(surface.position)?)
+}
+
+/// As [`direct`], for a sample of a light with a size: what the surface would send if the whole light were like the
+/// sample. The mean over all samples, with none for those that are hidden, is the light of the whole.
+#[inline]
+pub fn direct_from(
+    surface: &Surface,
+    light: &ShadingLight,
+    area: &AreaLight,
+    sample: &Light,
+) -> Option<Incident> {
+    if surface.unlit {
+        return None;
+    }
+    reflected(surface, light.incident_from(area, sample, surface.position)?)
+}
+
+#[inline]
+fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
     let cos_shading = surface.normal.dot(incident.towards);
     if cos_shading <= 0.0 || surface.geometric_normal.dot(incident.towards) <= 0.0 {
         return None;

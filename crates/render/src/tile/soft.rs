@@ -1,0 +1,108 @@
+//! The light of a source with a size: samples, and the share of them that a surface sees (HM08 §5.3).
+//!
+//! A surface receives the mean of what its samples send to it, each as a small light of its own with its own cosines
+//! and distance. HM08 measures visibility alone: there the light of the middle is multiplied with the share of samples
+//! seen.
+
+use glam::Vec3;
+use rayward_trace::{AreaLight, AreaLightTree, Light, Receiver, Samples, Tile, exact};
+
+use super::{TileShader, TileWork};
+use crate::RenderOptions;
+use crate::casters::triangles;
+use crate::shade::{direct, direct_from};
+
+/// The samples of a light: each light has sets of its own.
+pub(crate) fn samples(options: &RenderOptions, light: usize) -> Samples {
+    Samples::new(
+        options.samples,
+        options
+            .seed
+            .wrapping_add((light as u32).wrapping_mul(0x9e37_79b9)),
+    )
+}
+
+impl TileShader<'_> {
+    /// Adds the light of one source with a size to all points of the tile that it reaches.
+    pub(super) fn illuminate_softly(
+        &self,
+        light: usize,
+        tree: &AreaLightTree,
+        tile: &Tile,
+        work: &mut TileWork,
+    ) {
+        let samples = samples(self.options, light);
+        let area = tree.light();
+        work.receivers.clear();
+        work.pixels.clear();
+        work.asked.clear();
+        for (i, point) in work.points.iter().enumerate() {
+            let radiance = if self.options.paper {
+                direct(&point.surface, &self.lights[light]).map(|incident| incident.radiance)
+            } else {
+                (!point.surface.unlit).then_some(Vec3::ZERO)
+            };
+            if let Some(radiance) = radiance
+                && area.shines_at(point.receiver.point)
+                && self.may_face(area, &point.receiver)
+            {
+                work.receivers.push(point.receiver);
+                work.pixels
+                    .push((tile.y + point.y) * self.camera.width + tile.x + point.x);
+                work.asked.push((i as u32, radiance));
+            }
+        }
+        tree.visible(
+            &work.receivers,
+            &work.pixels,
+            &samples,
+            &mut work.area,
+            &mut work.visible,
+        );
+        let share = 1.0 / samples.count() as f32;
+        for n in 0..work.asked.len() {
+            let visible = &work.visible[n * samples.words()..(n + 1) * samples.words()];
+            if visible.iter().all(|&word| word == 0) {
+                continue;
+            }
+            let (i, radiance) = work.asked[n];
+            let (receiver, pixel) = (work.receivers[n], work.pixels[n]);
+            let surface = &work.points[i as usize].surface;
+            let certain = area.side(triangles(self.geometry).corners(receiver.prim)) != 0.0;
+            let mut sum = Vec3::ZERO;
+            for k in (0..samples.count()).filter(|k| visible[*k as usize / 32] >> (k % 32) & 1 != 0) {
+                let end = area.sample(&samples, pixel, receiver.point, k);
+                if !certain && !self.faces_end(&end, &receiver) {
+                    continue;
+                }
+                let sent = if self.options.paper {
+                    Some(radiance)
+                } else {
+                    direct_from(surface, &self.lights[light], area, &end).map(|incident| incident.radiance)
+                };
+                if let Some(sent) = sent {
+                    let passed = match &self.structures.layers {
+                        Some(bvh) => self.transmittance(bvh, &receiver, &end, &mut work.filters),
+                        None => 1.0,
+                    };
+                    sum += sent * passed;
+                }
+            }
+            work.points[i as usize].color += sum * share;
+        }
+    }
+
+    /// Whether some of a light may be on the side of a surface that the eye sees.
+    fn may_face(&self, area: &AreaLight, receiver: &Receiver) -> bool {
+        let corners = triangles(self.geometry).corners(receiver.prim);
+        let (lit, seen) = (area.side(corners), exact::side(corners, &self.eye));
+        lit == 0.0 || (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+    }
+
+    /// As [`Self::faces`], for a sample.
+    fn faces_end(&self, end: &Light, receiver: &Receiver) -> bool {
+        let corners = triangles(self.geometry).corners(receiver.prim);
+        let (lit, seen) = (exact::side(corners, end), exact::side(corners, &self.eye));
+        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+    }
+}
