@@ -37,6 +37,7 @@ Examples:
   rayward render city.glb --camera-position 40,30,60 --light sun:1,2,1 -o city.png
   rayward render --builtin walker --time 0.4 --shutter 0.04 --pixel-samples 32 -o walk.png
   rayward render --aperture 0.2 --focus 8 -o blurred.png
+  rayward render model.glb --light square:0,3,1:0.5 --samples 64 -o soft.png
   rayward render model.glb --layers depth,normal -o model.exr
   rayward render model.glb --npy layers --json > summary.json
   rayward render model.glb -o - | display";
@@ -143,9 +144,13 @@ pub(crate) struct ViewArgs {
     /// Full vertical field of view in degrees, for whichever camera is used
     #[arg(long, value_name = "DEGREES", value_parser = values::field_of_view)]
     pub(crate) camera_vfov: Option<f64>,
-    /// A light instead of the scene's, repeatable: point:x,y,z[:candela] stands there, sun:x,y,z[:lux] shines
-    /// from that direction. Without an intensity, a white matt surface in the middle of the scene shows
-    /// radiance 1
+    /// The camera file's area light instead of its point light
+    #[arg(long, requires = "camera_file")]
+    pub(crate) area_light: bool,
+    /// A light instead of the scene's, repeatable: point:x,y,z[:candela] stands there, sun:x,y,z[:lux[:degrees]] shines
+    /// from that direction and is so many degrees across. Lights with soft shadows: sphere:x,y,z:radius[:candela];
+    /// disk:x,y,z:radius[:nits] and square:x,y,z:side[:nits], which face the middle of the scene. Without an
+    /// intensity, a white matt surface in the middle of the scene shows radiance 1
     #[arg(long = "light", value_name = "LIGHT", value_parser = values::light)]
     pub(crate) lights: Vec<LightValue>,
 }
@@ -184,6 +189,12 @@ pub(crate) struct PictureArgs {
     /// Lights cast no shadows
     #[arg(long)]
     pub(crate) no_shadows: bool,
+    /// Samples of a light with a size, for each surface that a pixel sees
+    #[arg(long, value_name = "NUMBER", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub(crate) samples: u32,
+    /// Chooses the samples: the same number gives the same picture
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    pub(crate) seed: u32,
     /// Which sides of triangles cast shadows
     #[arg(long, value_name = "SIDES", default_value = "auto", conflicts_with = "paper")]
     pub(crate) casters: Casters,
@@ -213,7 +224,7 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "SECONDS", value_parser = values::positive)]
     pub(crate) shutter: Option<f64>,
     /// The literal parameters of Hunt and Mark 2008: 100x100 tiles, 200x200 light grids, binning by bounding
-    /// rectangle, back faces alone as casters
+    /// rectangle, back faces alone as casters, soft shadows as the share of a light that is seen
     #[arg(long)]
     pub(crate) paper: bool,
 }

@@ -151,6 +151,8 @@ fn options(args: &PictureArgs) -> RenderOptions {
         height: size.height,
         shadows: !args.no_shadows,
         casters: args.casters.into(),
+        samples: args.samples,
+        seed: args.seed,
         ambient: args.ambient.unwrap_or(defaults.ambient),
         background: args.background.unwrap_or(defaults.background),
         pixel_samples: args.pixel_samples.unwrap_or(if spread { 16 } else { 1 }),

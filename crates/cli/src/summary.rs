@@ -81,7 +81,6 @@ impl Summary {
         let seconds = (stats.build + stats.trace).as_secs_f64();
         let rays = (stats.eye_rays + stats.shadow_rays) as f64;
         let mut notices: Vec<_> = input.scene.notices.iter().map(ToString::to_string).collect();
-        notices.extend(view.notices());
         notices.extend(not_shaded(&input.scene));
         if moment.time != 0.0 && input.scene.animations.is_empty() {
             notices.push("--time: the scene has no animation".into());

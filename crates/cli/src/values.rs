@@ -97,38 +97,80 @@ pub(crate) fn size(text: &str) -> Parsed<Size> {
 /// A light on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum LightValue {
-    /// `point:x,y,z[:candela]`
-    Point { position: DVec3, candela: Option<f32> },
-    /// `sun:x,y,z[:lux]`
-    Sun { towards: DVec3, lux: Option<f32> },
+    /// `point:x,y,z[:candela]`, or `sphere:x,y,z:radius[:candela]`
+    Point {
+        position: DVec3,
+        radius: f32,
+        candela: Option<f32>,
+    },
+    /// `disk:x,y,z:radius[:nits]`, or `square:x,y,z:side[:nits]`
+    Flat {
+        position: DVec3,
+        kind: scene::LightKind,
+        nits: Option<f32>,
+    },
+    /// `sun:x,y,z[:lux[:degrees]]`
+    Sun {
+        towards: DVec3,
+        half_angle: f32,
+        lux: Option<f32>,
+    },
 }
 
 /// A light, see [`LightValue`].
 pub(crate) fn light(text: &str) -> Parsed<LightValue> {
-    let mut parts = text.split(':');
-    let kind = parts.next().unwrap_or_default();
-    let place = parts.next().ok_or("it has to be like point:1,2,3 or sun:1,2,3")?;
-    let intensity = match parts.next() {
-        None => None,
-        Some(text) => match single(text)? {
-            value if value >= 0.0 => Some(value),
-            _ => return Err("the intensity may not be below 0".into()),
-        },
+    let parts: Vec<&str> = text.split(':').collect();
+    let [kind, place, ref numbers @ ..] = parts[..] else {
+        return Err("it has to be like point:1,2,3 or sun:1,2,3".into());
     };
-    if parts.next().is_some() {
-        return Err("there are more than three parts between colons".into());
+    let most = if kind == "point" { 1 } else { 2 };
+    if numbers.len() > most {
+        return Err(format!("there are more than {} parts between colons", most + 2));
     }
-    match kind {
-        "point" => Ok(LightValue::Point {
-            position: vector(place)?,
-            candela: intensity,
-        }),
-        "sun" => Ok(LightValue::Sun {
-            towards: direction(place)?,
-            lux: intensity,
-        }),
-        _ => Err(format!("{kind:?} is neither point nor sun")),
-    }
+    let intensity = |at: usize| match numbers.get(at).map(|text| single(text)).transpose()? {
+        Some(value) if value < 0.0 => Err(String::from("the intensity may not be below 0")),
+        value => Ok(value),
+    };
+    let size = || {
+        let text = numbers.first().ok_or("its size is missing")?;
+        positive(text).map(|size| size as f32)
+    };
+    Ok(match kind {
+        "point" | "sphere" => {
+            let radius = if kind == "sphere" { size()? } else { 0.0 };
+            LightValue::Point {
+                position: vector(place)?,
+                radius,
+                candela: intensity(usize::from(kind == "sphere"))?,
+            }
+        }
+        "disk" | "square" => {
+            let size = size()?;
+            LightValue::Flat {
+                position: vector(place)?,
+                kind: match kind {
+                    "disk" => scene::LightKind::Disk { radius: size },
+                    _ => scene::LightKind::Rectangle {
+                        width: size,
+                        height: size,
+                    },
+                },
+                nits: intensity(1)?,
+            }
+        }
+        "sun" => {
+            let degrees = numbers.get(1).map_or(Ok(0.0), |text| not_negative(text))?;
+            if degrees > 90.0 {
+                return Err("the sun may not be more than 90 degrees across".into());
+            }
+            LightValue::Sun {
+                towards: direction(place)?,
+                half_angle: (degrees * 0.5).to_radians() as f32,
+                lux: intensity(0)?,
+            }
+        }
+        _ => return Err(format!("{kind:?} is none of point, sphere, disk, square and sun")),
+    })
 }
 
 /// Up axis of a file.
@@ -236,11 +278,31 @@ mod tests {
     #[test]
     fn lights_have_a_kind_a_place_and_perhaps_an_intensity() {
         let position = DVec3::new(1.0, -2.0, 3.0);
-        let candela = None;
-        assert_eq!(light("point:1,-2,3"), Ok(LightValue::Point { position, candela }));
-        let lux = Some(1000.0);
-        let towards = DVec3::Y;
-        assert_eq!(light("sun:0,1,0:1000"), Ok(LightValue::Sun { towards, lux }));
+        let point = |radius: f32, candela: Option<f32>| LightValue::Point {
+            position,
+            radius,
+            candela,
+        };
+        assert_eq!(light("point:1,-2,3"), Ok(point(0.0, None)));
+        assert_eq!(light("sphere:1,-2,3:0.5"), Ok(point(0.5, None)));
+        assert_eq!(light("sphere:1,-2,3:0.5:7"), Ok(point(0.5, Some(7.0))));
+        let sun = |half_angle: f32| LightValue::Sun {
+            towards: DVec3::Y,
+            half_angle,
+            lux: Some(1000.0),
+        };
+        assert_eq!(light("sun:0,1,0:1000"), Ok(sun(0.0)));
+        assert_eq!(light("sun:0,1,0:1000:2"), Ok(sun(1f32.to_radians())));
+        let flat = |kind: scene::LightKind, nits: Option<f32>| LightValue::Flat { position, kind, nits };
+        assert_eq!(
+            light("disk:1,-2,3:2"),
+            Ok(flat(scene::LightKind::Disk { radius: 2.0 }, None))
+        );
+        let square = scene::LightKind::Rectangle {
+            width: 2.0,
+            height: 2.0,
+        };
+        assert_eq!(light("square:1,-2,3:2:9"), Ok(flat(square, Some(9.0))));
         for wrong in [
             "point",
             "sun:0,0,0",
@@ -248,6 +310,11 @@ mod tests {
             "point:1,2,3:-1",
             "point:1,2,3:4:5",
             "point:1,2,3:1e99",
+            "sphere:1,2,3",
+            "sphere:1,2,3:0",
+            "disk:1,2,3:1:2:3",
+            "square:1,2,3:-1",
+            "sun:1,2,3:1:91",
         ] {
             assert!(light(wrong).is_err(), "{wrong}");
         }

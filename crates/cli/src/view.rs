@@ -77,8 +77,10 @@ impl View {
         }
 
         let center = input::center(frame);
-        // An entry's area light stands where its point light does: the same light for soft shadows.
-        let of_file = entry.map_or(Vec::new(), |entry| entry.lights().into_iter().take(1).collect());
+        let of_file = match entry {
+            Some(entry) => of_entry(&entry, args.area_light)?,
+            None => Vec::new(),
+        };
         let (lights, lights_origin) = if !args.lights.is_empty() {
             let lights = args.lights.iter().map(|light| posed(light, center));
             (lights.collect(), Origin::CommandLine)
@@ -96,26 +98,22 @@ impl View {
             lights_origin,
         })
     }
-
-    /// What of the lights does not show in the picture.
-    pub(crate) fn notices(&self) -> Vec<String> {
-        let sized = self.lights.iter().filter(|light| has_size(light.kind)).count();
-        if sized == 0 {
-            return Vec::new();
-        }
-        vec![format!(
-            "{sized} of {} lights with a size: shadows are cast from the middle and sharp",
-            self.lights.len()
-        )]
-    }
 }
 
-fn has_size(kind: LightKind) -> bool {
-    match kind {
-        LightKind::Point { radius } | LightKind::Spot { radius, .. } => radius > 0.0,
-        LightKind::Directional { half_angle } => half_angle > 0.0,
-        LightKind::Rectangle { .. } | LightKind::Disk { .. } => true,
+/// The one light of a camera file's entry that is used. Its area light stands where its point light does: the same light
+/// for soft shadows.
+fn of_entry(entry: &CameraEntry, area: bool) -> Result<Vec<PosedLight>, Failure> {
+    let lights = entry.lights();
+    if !area {
+        return Ok(lights.into_iter().take(1).collect());
     }
+    if entry.area_light.is_none() {
+        return Err(Failure::new(
+            Code::Input,
+            "--area-light: the entry of the camera file has none",
+        ));
+    }
+    Ok(lights.into_iter().last().into_iter().collect())
 }
 
 fn perspective(degrees: f64) -> Projection {
@@ -164,14 +162,33 @@ fn entry(file: &Path, name: Option<&str>, input: &Input) -> Result<CameraEntry, 
 
 fn posed(light: &LightValue, center: DVec3) -> PosedLight {
     match *light {
-        LightValue::Point { position, candela } => {
+        LightValue::Point {
+            position,
+            radius,
+            candela,
+        } => {
             let mut light = point_light_for(position, center);
+            light.kind = LightKind::Point { radius };
             if let Some(candela) = candela {
                 light.power = Vec3::splat(candela);
             }
             light
         }
-        LightValue::Sun { towards, lux } => {
+        LightValue::Flat { position, kind, nits } => {
+            let light = point_light_for(position, center);
+            let area = match kind {
+                LightKind::Disk { radius } => PI as f32 * radius * radius,
+                LightKind::Rectangle { width, height } => width * height,
+                _ => 1.0,
+            };
+            let power = nits.map_or(light.power / area, Vec3::splat);
+            PosedLight { kind, power, ..light }
+        }
+        LightValue::Sun {
+            towards,
+            half_angle,
+            lux,
+        } => {
             let direction = -towards;
             let (axis_x, axis_y) = direction.any_orthonormal_pair();
             PosedLight {
@@ -182,7 +199,7 @@ fn posed(light: &LightValue, center: DVec3) -> PosedLight {
                 axis_y,
                 power: Vec3::splat(lux.unwrap_or(PI as f32)),
                 range: f32::INFINITY,
-                kind: LightKind::Directional { half_angle: 0.0 },
+                kind: LightKind::Directional { half_angle },
             }
         }
     }

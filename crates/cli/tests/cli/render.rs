@@ -279,6 +279,22 @@ fn lights_change_the_picture() {
         }
     }
     assert!(pictures[1] == picture(&["--light", "sun:1,1,1", "--exposure", "0"]));
+    let soft = |more: &[&str]| picture(&[&["--light", "sphere:2,3,4:1.5"], more].concat());
+    let softs = [
+        soft(&[]),
+        soft(&["--samples", "3"]),
+        soft(&["--seed", "1"]),
+        picture(&["--light", "disk:2,3,4:1.5"]),
+        picture(&["--light", "square:2,3,4:2"]),
+        picture(&["--light", "sun:1,1,1:3:20"]),
+    ];
+    assert!(softs[0] == soft(&["--samples", "8", "--seed", "0"]));
+    for (i, a) in softs.iter().enumerate() {
+        assert!(
+            softs[i + 1..].iter().all(|b| a != b) && pictures.iter().all(|b| a != b),
+            "{i}"
+        );
+    }
 }
 
 #[test]
