@@ -200,8 +200,8 @@ fn measure_frame(
     pictures: PictureSink,
 ) -> FrameReport {
     let (width, height) = (job.view.width, job.view.height);
-    let takes_part = |c: &&Box<dyn Contender + Send + Sync>| job.kind != FrameKind::Eye || !c.only_shadows();
-    let contenders: Vec<_> = contenders.iter().filter(takes_part).collect();
+    let takes_part = |c: &&(dyn Contender + Send + Sync)| job.kind != FrameKind::Eye || !c.only_shadows();
+    let contenders: Vec<_> = contenders.iter().map(Box::as_ref).filter(takes_part).collect();
     let mut shadow_rays = 0;
     let mut first: Option<Picture> = None;
     let mut rows: Vec<Row> = Vec::new();
@@ -254,7 +254,7 @@ fn measure_frame(
 /// Runs all that draw the same picture in turns, each round beginning with another one.
 fn time_all(
     job: &Job,
-    contenders: &[&Box<dyn Contender + Send + Sync>],
+    contenders: &[&(dyn Contender + Send + Sync)],
     rows: &mut [Row],
     runs: usize,
     rays: u64,

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 use rayward::trace::{
-    BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, HitBlocks, Light, LightGridOptions, PointLightGrid,
-    Receiver, ShadowScratch, Tile, TileHits, Triangles, View, darken, exact,
+    BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver,
+    ShadowScratch, Tile, TileHits, Triangles, View, darken, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
@@ -51,7 +51,13 @@ impl Contender for Rayward {
 
     fn draw(&self, job: &Job, picture: &mut Picture) -> u64 {
         let triangles = job.scene.triangles();
-        let eye = EyeGrid::build(job.view, triangles, EyeGridOptions::default(), job.level);
+        let eye = EyeGrid::build_clustered(
+            job.view,
+            triangles,
+            &job.scene.clusters,
+            EyeGridOptions::default(),
+            job.level,
+        );
         let light = match job.kind {
             FrameKind::Eye => None,
             FrameKind::EyeHard => Some(self.light_grid(job, job.light)),
@@ -79,7 +85,13 @@ impl Rayward {
     /// rays.
     pub(crate) fn ask_lights(&self, job: &Job, lights: &[Light]) -> u64 {
         let triangles = job.scene.triangles();
-        let eye = EyeGrid::build(job.view, triangles, EyeGridOptions::default(), job.level);
+        let eye = EyeGrid::build_clustered(
+            job.view,
+            triangles,
+            &job.scene.clusters,
+            EyeGridOptions::default(),
+            job.level,
+        );
         let grids: Vec<_> = lights.iter().map(|&light| self.light_grid(job, light)).collect();
         let tiles = (0..eye.tile_count())
             .into_par_iter()
@@ -135,8 +147,7 @@ impl Work {
         self.lit.resize((columns * rows) as usize, [0; BLOCK_LANES]);
         for i in 0..self.lit.len() {
             let (column, row) = (i as u32 % columns, i as u32 / columns);
-            let (prims, _) = self.hits.block(column, row);
-            for (lane, &prim) in prims.iter().enumerate() {
+            for (lane, &prim) in self.hits.block(column, row).prim.iter().enumerate() {
                 let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
                 if prim == u32::MAX || x >= tile.width || y >= tile.height {
                     continue;

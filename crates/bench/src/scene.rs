@@ -7,7 +7,7 @@ use rayward::CameraFrame;
 use rayward::scene::{
     self, CameraEntry, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight, Scene, builtin,
 };
-use rayward::trace::{Light, Topology, Triangles, View};
+use rayward::trace::{Clusters, Light, Topology, Triangles, View};
 
 use crate::{Error, Result};
 
@@ -50,6 +50,8 @@ pub struct BenchScene {
     pub geometry: FrameGeometry,
     /// Which triangles belong together; kept between frames as a renderer keeps it.
     pub topology: Topology,
+    /// Clusters of its triangles, found once.
+    pub clusters: Clusters,
     camera: PosedCamera,
     light: PosedLight,
 }
@@ -112,11 +114,13 @@ impl BenchScene {
         lights.extend(scene::default_lights(&camera));
         let light = lights.into_iter().next().expect("there are default lights");
         let topology = Topology::analyse(&triangles_of(&geometry));
+        let clusters = Clusters::new(&triangles_of(&geometry));
         Ok(Self {
             name: name.into(),
             scene,
             geometry,
             topology,
+            clusters,
             camera,
             light,
         })
@@ -137,13 +141,7 @@ impl BenchScene {
             let (name, problem) = (self.name.clone(), "its camera is orthographic");
             return Err(Error::Scene { name, problem });
         }
-        let half = [
-            camera.step_x.length() * f64::from(width),
-            camera.step_y.length() * f64::from(height),
-        ];
-        let axes = [camera.right, camera.up, camera.forward];
-        let half = half.map(|v| v * 0.5);
-        Ok(View::perspective(camera.eye, axes, half, [width, height]))
+        Ok(camera.view(&self.geometry))
     }
 
     /// The light, as a point or a direction.

@@ -112,7 +112,7 @@ impl MomentArgs {
     pub(crate) fn after(&self, seconds: f64) -> Self {
         Self {
             time: (f64::from(self.time) + seconds) as f32,
-            animation: self.animation,
+            animation: self.animation.clone(),
         }
     }
 }

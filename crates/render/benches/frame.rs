@@ -16,8 +16,8 @@ use divan::counter::ItemsCount;
 use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
     AreaLight, AreaLightTree, AreaScratch, Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions,
-    LightQuery, LitPixels, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits, View, Visibility,
-    exact,
+    LightQuery, LitPixels, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits, View,
+    Visibility, exact,
 };
 use rayward::{CameraFrame, FramePlan, RenderOptions, shadow_end, triangles};
 

@@ -105,6 +105,18 @@ impl CameraFrame {
         View::parallel(self.eye, axes, self.half, 4.0 * farthest.max(1e-30), size)
     }
 
+    /// From the eye to a raster point in the plane at depth 1; in the plane of the eye for an orthographic camera.
+    pub(crate) fn offset(&self, [x, y]: [f64; 2]) -> DVec3 {
+        let right = self.half[0] * (2.0 * x / f64::from(self.width) - 1.0);
+        let up = self.half[1] * (1.0 - 2.0 * y / f64::from(self.height));
+        let ahead = if self.orthographic {
+            DVec3::ZERO
+        } else {
+            self.forward
+        };
+        ahead + self.right * right + self.up * up
+    }
+
     /// Where the eye rays come from, as a light that would light what they see.
     pub fn vantage(&self) -> Light {
         if self.orthographic {

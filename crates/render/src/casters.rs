@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 use rayward_scene::{AlphaMode, FrameGeometry, Scene};
-use rayward_trace::{AreaLight, Casts, Light, Topology, Triangles};
+use rayward_trace::{AreaLight, Casts, Light, Topology};
 
 use crate::CasterPolicy;
 use crate::geometry::triangles;

@@ -24,7 +24,7 @@ use rayward_scene::{AlphaMode, FrameGeometry, PosedCamera, PosedLight, Scene};
 use rayward_trace::exact::{self, ExactHit};
 use rayward_trace::{Candidates, FaceOptions, Light, MovingAt, MovingGrids, MovingTriangles, Ray, Receiver};
 
-use crate::casters::triangles;
+use crate::geometry::triangles;
 use crate::lens::{Lens, MovingCamera};
 use crate::pixel_samples::PixelSample;
 use crate::plan::FramePlan;

@@ -37,14 +37,14 @@ pub(crate) struct MovingCamera<'c> {
 impl MovingCamera<'_> {
     /// The ray of a sample of pixel (x, y).
     pub(crate) fn ray(&self, x: u32, y: u32, sample: &PixelSample) -> Ray {
-        let mix = |of: fn(&CameraFrame) -> DVec3| {
+        let mix = |of: &dyn Fn(&CameraFrame) -> DVec3| {
             let (open, close) = (of(self.open), of(self.close));
             open + (close - open) * sample.time
         };
         let place = [f64::from(x) + sample.pixel[0], f64::from(y) + sample.pixel[1]];
-        let eye = mix(|c| c.eye.as_dvec3());
-        let offset = mix(|c| c.corner) + mix(|c| c.step_x) * place[0] + mix(|c| c.step_y) * place[1];
-        let forward = mix(|c| c.forward);
+        let eye = mix(&|c| c.eye.as_dvec3());
+        let offset = mix(&|c| c.offset(place));
+        let forward = mix(&|c| c.forward);
         let (from, ahead) = if self.open.orthographic {
             (eye + offset, forward)
         } else {
@@ -54,7 +54,7 @@ impl MovingCamera<'_> {
             return Ray::new(from.as_vec3(), ahead.as_vec3());
         };
         let [u, v] = on_disk(sample.lens);
-        let origin = (from + (mix(|c| c.right) * u + mix(|c| c.up) * v) * lens.radius).as_vec3();
+        let origin = (from + (mix(&|c| c.right) * u + mix(&|c| c.up) * v) * lens.radius).as_vec3();
         let target = from + ahead * lens.focus;
         Ray::new(origin, ((target - origin.as_dvec3()) / lens.focus).as_vec3())
     }
@@ -115,7 +115,7 @@ mod tests {
             let ray = camera.ray(10, 20, &sample);
             assert!((ray.dir.z + 1.0).abs() < 1e-6);
             let there = ray.origin + ray.dir * 4.0;
-            let wanted = (open.offset(10.25, 20.75) * 4.0 + DVec3::X * sample.time).as_vec3();
+            let wanted = (open.offset([10.25, 20.75]) * 4.0 + DVec3::X * sample.time).as_vec3();
             assert!((there - wanted).length() < 1e-5, "{there} {wanted}");
             let center = DVec3::X * sample.time;
             let beside = (ray.origin.as_dvec3() - center).length() as f32;

@@ -99,7 +99,14 @@ impl<'g> FrameStructures<'g> {
                 format!("{:?}", plan.name)
             };
             let start = Instant::now();
-            let shadows = shadows_of(plan, visibility.as_ref(), geometry, rules, eye_point, options.level);
+            let shadows = shadows_of(
+                plan,
+                visibility.as_ref(),
+                geometry,
+                rules,
+                eye_point,
+                options.level,
+            );
             stats.push(shadows.stats(&name, start));
             lights.push(shadows);
         }

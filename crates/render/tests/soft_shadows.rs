@@ -109,11 +109,7 @@ fn check(name: &str, size: [u32; 2], lights: impl Fn(&FrameGeometry) -> Vec<Pose
         ..RenderOptions::default()
     };
     let frame = CameraFrame::new(&camera, geometry.origin, size[0], size[1]).expect("valid camera");
-    let half = [
-        frame.step_x.length() * 0.5 * f64::from(size[0]),
-        frame.step_y.length() * 0.5 * f64::from(size[1]),
-    ];
-    let view = View::perspective(frame.eye, [frame.right, frame.up, frame.forward], half, size);
+    let view = frame.view(&geometry);
     let shader = Shader::new(&scene);
     let seen = closest_of_all(&geometry, view);
     let expected: Vec<Vec3> = seen

@@ -270,7 +270,7 @@ mod tests {
                     ];
                     match light.shape {
                         Shape::Rectangle => {
-                            assert!(offset.y == 0.0 && share.iter().all(|s| s.abs() < 1.0001))
+                            assert!(offset.y == 0.0 && share.iter().all(|s| s.abs() < 1.0001));
                         }
                         Shape::Disk => {
                             assert!(offset.y == 0.0 && share[0].hypot(share[1]) < 1.0001);

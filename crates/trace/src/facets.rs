@@ -216,7 +216,7 @@ mod tests {
                 Arrangement::Parallel { reach } => reach as f32 - nearness,
             };
             let blocks = (0..count as u32).map(|i| hits.block(i % columns, i / columns));
-            let (prim, depth) = blocks.map(|(prim, near)| (*prim, near.map(depth))).unzip();
+            let (prim, depth) = blocks.map(|b| (b.prim, b.nearness.map(depth))).unzip();
             Self { columns, prim, depth }
         }
     }

@@ -9,7 +9,7 @@ use rayward_trace::{AreaLight, AreaLightTree, Light, Receiver, Samples, Tile, ex
 
 use super::{TileShader, TileWork};
 use crate::RenderOptions;
-use crate::casters::triangles;
+use crate::geometry::triangles;
 use crate::shade::{direct, direct_from};
 
 /// The samples of a light: each light has sets of its own.
