@@ -77,4 +77,31 @@ mod tests {
         assert_eq!(determinant(a, b, a - b), 0.0);
         assert_eq!(determinant(DVec3::X, DVec3::Y, DVec3::Z), 1.0);
     }
+    /// Vectors that all but lie in a plane, in whole numbers of 40 bits.
+    #[test]
+    fn what_is_left_is_right_to_the_last_bits() {
+        let mut state = 5u64;
+        let mut whole = |bits: u32| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            i128::from((state as i64) >> (64 - bits))
+        };
+        for _ in 0..2000 {
+            let (a, b, off) = (
+                [(); 3].map(|()| whole(40)),
+                [(); 3].map(|()| whole(40)),
+                [(); 3].map(|()| whole(3)),
+            );
+            let c = [0, 1, 2].map(|i| a[i] - 3 * b[i] + off[i]);
+            let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+            let exact = (a[0] * minor(1, 2) + a[1] * minor(2, 0) + a[2] * minor(0, 1)) as f64;
+            let [a, b, c] = [a, b, c].map(|v| DVec3::from_array(v.map(|x| x as f64)));
+            let found = determinant(a, b, c);
+            assert!(
+                (found - exact).abs() <= exact.abs() * 2f64.powi(-50),
+                "{found}, should be {exact}"
+            );
+        }
+    }
 }

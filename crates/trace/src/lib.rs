@@ -8,6 +8,7 @@
 //! | rays that nearly share an origin, and any other | [`PerspectiveGrids`] | HM08 §5.3 |
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | soft shadow rays of one light | [`AreaLightTree`] | HM08 §5.3, in a hierarchy |
+//! | any ray, at spheres, cylinders, capsules and what is made of them | [`solids::SolidGrids`] | HM08 §3 |
 //! | any ray | [`Bvh`] | general hierarchy |
 //! | any ray | [`Grid3`] in world space | the regular grid of HM08, Table 5 |
 //! | any ray | [`Ldc`] | VMV07 |
@@ -43,6 +44,7 @@ mod queries;
 mod ray;
 mod receiver_grid;
 mod samples;
+pub mod solids;
 pub mod space;
 #[cfg(test)]
 mod test_meshes;
