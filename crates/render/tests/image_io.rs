@@ -342,7 +342,7 @@ fn absurd_sizes_do_not_allocate() {
     }
     assert!(matches!(
         read_picture(&write(folder.path(), "b.exr", &bytes)),
-        Err(Error::ImageTooLarge { .. })
+        Err(Error::MalformedImage { .. })
     ));
 }
 
