@@ -117,7 +117,10 @@ impl FramesReport {
     }
 }
 
-/// Pictures of the first contender, as they were compared.
+/// A contender that threads can share.
+type Drawer = dyn Contender + Send + Sync;
+
+/// Gets every picture that is compared, with a name.
 pub type PictureSink<'p> = &'p mut (dyn FnMut(&str, &Picture) + Send);
 
 /// Measures these scenes. `progress` is told what is being done; `pictures` gets every picture with a name.
@@ -171,9 +174,9 @@ fn contenders(
     scene: &BenchScene,
     options: &FramesOptions,
     libraries: &[Library],
-) -> Result<Vec<Box<dyn Contender + Send + Sync>>> {
+) -> Result<Vec<Box<Drawer>>> {
     let triangles = scene.triangles();
-    let mut contenders: Vec<Box<dyn Contender + Send + Sync>> = vec![Box::new(Rayward {
+    let mut contenders: Vec<Box<Drawer>> = vec![Box::new(Rayward {
         casters: CasterPolicy::Auto,
     })];
     if options.kinds.contains(&FrameKind::EyeHard) {
@@ -193,15 +196,10 @@ fn contenders(
     Ok(contenders)
 }
 
-fn measure_frame(
-    job: &Job,
-    contenders: &[Box<dyn Contender + Send + Sync>],
-    runs: usize,
-    pictures: PictureSink,
-) -> FrameReport {
+fn measure_frame(job: &Job, contenders: &[Box<Drawer>], runs: usize, pictures: PictureSink) -> FrameReport {
     let (width, height) = (job.view.width, job.view.height);
-    let takes_part = |c: &&(dyn Contender + Send + Sync)| job.kind != FrameKind::Eye || !c.only_shadows();
-    let contenders: Vec<_> = contenders.iter().map(Box::as_ref).filter(takes_part).collect();
+    let takes_part = |c: &&Drawer| job.kind != FrameKind::Eye || !c.only_shadows();
+    let contenders: Vec<&Drawer> = contenders.iter().map(|c| &**c).filter(takes_part).collect();
     let mut shadow_rays = 0;
     let mut first: Option<Picture> = None;
     let mut rows: Vec<Row> = Vec::new();
@@ -252,13 +250,7 @@ fn measure_frame(
 }
 
 /// Runs all that draw the same picture in turns, each round beginning with another one.
-fn time_all(
-    job: &Job,
-    contenders: &[&(dyn Contender + Send + Sync)],
-    rows: &mut [Row],
-    runs: usize,
-    rays: u64,
-) {
+fn time_all(job: &Job, contenders: &[&Drawer], rows: &mut [Row], runs: usize, rays: u64) {
     let mut picture = Picture::new(job.view.width, job.view.height, tile_side());
     let mut times: Vec<Vec<Time>> = vec![Vec::new(); contenders.len()];
     for round in 0..runs {

@@ -77,6 +77,7 @@ mod tests {
         assert_eq!(determinant(a, b, a - b), 0.0);
         assert_eq!(determinant(DVec3::X, DVec3::Y, DVec3::Z), 1.0);
     }
+
     /// Vectors that all but lie in a plane, in whole numbers of 40 bits.
     #[test]
     fn what_is_left_is_right_to_the_last_bits() {
@@ -103,5 +104,46 @@ mod tests {
                 "{found}, should be {exact}"
             );
         }
+    }
+
+    #[test]
+    fn a_ray_almost_in_a_plane_hits_where_the_triangle_is() {
+        let mut state = 7u64;
+        let mut next = |range: i64| {
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
+            (state >> 20) as i64 % range - range / 2
+        };
+        let (mut hits, mut astray) = (0, 0);
+        for _ in 0..4000 {
+            let corners: [[i64; 3]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| 3 * next(1 << 15)));
+            let e: [[i64; 3]; 2] =
+                std::array::from_fn(|i| std::array::from_fn(|k| corners[i + 1][k] - corners[0][k]));
+            let n: [i64; 3] = std::array::from_fn(|i| {
+                let (j, k) = ((i + 1) % 3, (i + 2) % 3);
+                e[0][j] * e[1][k] - e[0][k] * e[1][j]
+            });
+            // From beside the plane by a step in x, along it but for a step in z.
+            let (s, t, step) = (next(4), next(4), 2f64.powi(-30));
+            let origin: [i64; 3] = std::array::from_fn(|i| corners[0][i] - s * e[0][i] - t * e[1][i]);
+            let target: [i64; 3] = std::array::from_fn(|i| corners[0][i] + (e[0][i] + e[1][i]) / 3);
+            let vector = |v: [i64; 3]| DVec3::from_array(v.map(|x| x as f64));
+            let from = vector(origin) - DVec3::X * step;
+            let dir = vector(target) - vector(origin) + DVec3::Z * step;
+            let truth = n[0] as f64 / n[2] as f64;
+            let Some(hit) = crate::exact::hit(from, dir, corners.map(|c| vector(c).as_vec3())) else {
+                continue;
+            };
+            hits += 1;
+            assert!(
+                (hit.t - truth).abs() <= truth.abs() * 1e-6,
+                "{} is not {truth}",
+                hit.t
+            );
+            let plain = (vector(corners[0]) - from).dot(vector(n)) / dir.dot(vector(n));
+            astray += usize::from((plain - truth).abs() > truth.abs() * 1e-3);
+        }
+        assert!(hits > 300 && astray > 100, "{hits} {astray}");
     }
 }
