@@ -280,36 +280,44 @@ pub(crate) struct Entry {
 /// Side of a light tile in units of the face's raster.
 pub(crate) const LIGHT_TILE: u32 = 64;
 
-/// Projects the surface points of `asked` pixels (a block and a bit for each) of one tile of the eye's. Each receiver that a
-/// caster may come before gets its lane in one of the `entries`, whose points are relative to their light tile.
+/// The pixels of one of the eye's tiles that ask about a light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asking<'a> {
+    pub(crate) eye_tile: u32,
+    pub(crate) rays: &'a TileRays,
+    /// Hit parameters, block by block.
+    pub(crate) t: &'a [[f64; LANES]],
+    /// A bit for each pixel of each block.
+    pub(crate) pixels: &'a [u16],
+}
+
+/// Projects the surface points of the pixels that ask. Each that a caster may come before gets its lane in one of the
+/// `entries`, whose points are relative to their light tile.
 pub(crate) fn project_receivers(
     level: SimdLevel,
-    rays: &TileRays,
-    t: &[[f64; LANES]],
-    asked: &[u16],
+    asking: &Asking,
     faces: &LightFaces,
-    eye_tile: u32,
     points: &mut Vec<BlockPoints>,
     entries: &mut Vec<Entry>,
 ) {
-    dispatch!(level.0, simd => {
-        let out = (eye_tile, points, entries);
-        project_receivers_impl(simd, rays, t, asked, faces, out);
-    });
+    dispatch!(level.0, simd => project_receivers_impl(simd, asking, faces, points, entries));
 }
-
-type Out<'o> = (u32, &'o mut Vec<BlockPoints>, &'o mut Vec<Entry>);
 
 #[inline(always)]
 fn project_receivers_impl<S: Simd>(
     simd: S,
-    rays: &TileRays,
-    t: &[[f64; LANES]],
-    asked: &[u16],
+    asking: &Asking,
     faces: &LightFaces,
-    (eye_tile, points, entries): Out,
+    points: &mut Vec<BlockPoints>,
+    entries: &mut Vec<Entry>,
 ) {
-    for (block, &asked) in asked.iter().enumerate() {
+    let Asking {
+        eye_tile,
+        rays,
+        t,
+        pixels,
+    } = *asking;
+    for (block, &asked) in pixels.iter().enumerate() {
         if asked == 0 {
             continue;
         }

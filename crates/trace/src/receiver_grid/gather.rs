@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::LightQuery;
 use crate::kernel::pixels::{
-    BlockPoints, Entry, LightFaces, PixelPlane, Span, TileRays, find_spans, hit_parameters, project_receivers,
+    Asking, BlockPoints, Entry, LightFaces, PixelPlane, Span, TileRays, find_spans, hit_parameters,
+    project_receivers,
 };
 use crate::kernel::{LANES, SimdLevel};
 use crate::view::Arrangement;
@@ -62,16 +63,14 @@ pub(super) fn gather(
                 lit: work.asked.clone(),
                 ..Gathered::default()
             };
-            project_receivers(
-                level,
-                &work.rays,
-                &work.t,
-                &work.asked,
-                faces,
-                index as u32,
-                &mut gathered.points,
-                &mut gathered.entries,
-            );
+            let asking = Asking {
+                eye_tile: index as u32,
+                rays: &work.rays,
+                t: &work.t,
+                pixels: &work.asked,
+            };
+            let Gathered { points, entries, .. } = &mut gathered;
+            project_receivers(level, &asking, faces, points, entries);
             for entry in &gathered.entries {
                 let block = gathered.points[entry.points as usize].block;
                 gathered.lit[block as usize] &= !entry.lanes;

@@ -138,14 +138,14 @@ fn small_triangles_and_many_receivers_a_cell() {
         Vec3::new(-50.0, 1.1, -50.0),
         Vec3::new(-50.0, 1.0, -49.0),
     ]);
-    let view = looking(Vec3::new(0.05, 0.08, 0.1), Vec3::ZERO, 0.5, [160, 100]);
+    let view = looking(Vec3::new(0.05, 0.08, 0.1), Vec3::ZERO, 0.5, [80, 50]);
     let lights = vec![
         Light::Point(Vec3::new(0.1, 0.2, 0.05)),
         Light::Directional(Vec3::new(0.4, 1.0, 0.3)),
     ];
     let [seen, lit, _, exact] = check_lights("far ground", &mesh, view, lights);
     println!("{seen} seen, {lit} lit, {exact} exact pairs");
-    assert!(lit > 1000 && lit < seen);
+    assert!(lit > 250 && lit < seen);
 }
 
 #[test]
