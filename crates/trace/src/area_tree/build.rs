@@ -3,7 +3,7 @@
 //! A triangle has one entry, wherever it reaches, so there is nothing to choose a resolution for. Entries are sorted
 //! by size class, then by the bits of their middle's place in the raster and its depth (a Morton curve); sixteen in a row
 //! share a node, sixteen nodes in a row their parent. Size classes keep a large triangle from stretching the boxes of
-//! small neighbours. Where in the order the bits of depth stand is what the tree adapts: see [`super::metric`].
+//! small neighbours. The bits of depth follow after a fixed number of those of the raster.
 
 use rayon::prelude::*;
 

@@ -124,10 +124,6 @@ impl EdgeLanes {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Origin {
     /// One point for all, evaluated up to `reach` away from it on either axis.
-    #[allow(
-        dead_code,
-        reason = "batches with a common origin count from here; not every kernel has such"
-    )]
     Point { x: f32, y: f32, reach: f32 },
     /// Each triangle's own corner 0.
     OwnCorner,
