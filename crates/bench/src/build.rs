@@ -2,11 +2,11 @@
 
 use rayon::ThreadPool;
 use rayward::CasterPolicy;
-use rayward::trace::{EyeGrid, EyeGridOptions, SimdLevel};
+use rayward::trace::{EyeGrid, EyeGridOptions, SimdLevel, Visibility};
 use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
-use crate::ours::{Rayward, tile_side};
+use crate::ours::{Rayward, eye_grid, tile_side};
 use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch};
 
 /// What is measured.
@@ -42,14 +42,16 @@ pub struct SceneBuilds {
     pub scene: String,
     /// Its triangles.
     pub triangles: usize,
-    /// The grid of the camera: projection and binning.
+    /// The grid of the camera: clusters sorted into tiles.
     pub eye_grid: Scaled,
-    /// The grid of its light, caster rules included.
-    pub light_grid: Scaled,
+    /// Hard shadows of all pixels, caster rules included.
+    pub shadows: Scaled,
+    /// A grid of all triangles for the camera: projection and binning of every one.
+    pub binning: Scaled,
     /// The whole frame, eye rays and hard shadows.
     pub frame: Scaled,
-    /// References from tiles to triangles in the camera's grid.
-    pub eye_references: usize,
+    /// References from tiles to triangles in the grid of all.
+    pub references: usize,
 }
 
 /// One piece of work with one thread and with several.
@@ -90,26 +92,24 @@ pub fn measure(
     };
     for scene in scenes {
         progress(&scene.name);
-        let job = Job {
-            scene,
-            view: scene.view(options.width, options.height)?,
-            light: scene.light(),
-            kind: FrameKind::EyeHard,
-            level: options.level,
-        };
+        let size = [options.width, options.height];
+        let job = Job::new(scene, size, FrameKind::EyeHard, options.level)?;
         let triangles = scene.geometry.triangle_count();
         let scaled = |work: &mut (dyn FnMut() + Send)| scaled(&pools, options.runs, triangles, work);
-        let grid = || EyeGrid::build(job.view, scene.triangles(), EyeGridOptions::default(), job.level);
+        let view = job.view;
+        let all = || EyeGrid::build(view, scene.triangles(), EyeGridOptions::default(), job.level);
+        let visibility = Visibility::trace(&eye_grid(&job), &|| ());
         let mut picture = Picture::new(options.width, options.height, tile_side());
         report.scenes.push(SceneBuilds {
             scene: scene.name.clone(),
             triangles,
-            eye_grid: scaled(&mut || drop(grid())),
-            light_grid: scaled(&mut || drop(ours.light_grid(&job, job.light))),
+            eye_grid: scaled(&mut || drop(eye_grid(&job))),
+            binning: scaled(&mut || drop(all())),
+            shadows: scaled(&mut || drop(ours.lit(&job, &visibility, job.light))),
             frame: scaled(&mut || {
                 ours.draw(&job, &mut picture);
             }),
-            eye_references: grid().reference_count(),
+            references: all().reference_count(),
         });
     }
     Ok(report)

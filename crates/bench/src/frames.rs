@@ -155,13 +155,7 @@ pub fn measure(
         progress(&format!("{}: building the structures of the peers", scene.name));
         let contenders = pool.install(|| contenders(scene, options, &libraries))?;
         for &kind in &options.kinds {
-            let job = Job {
-                scene,
-                view: scene.view(options.width, options.height)?,
-                light: scene.light(),
-                kind,
-                level: options.level,
-            };
+            let job = Job::new(scene, [options.width, options.height], kind, options.level)?;
             progress(&format!("{}: {}", scene.name, kind.name()));
             let frame = pool.install(|| measure_frame(&job, &contenders, options.runs, pictures));
             report.frames.push(frame);
@@ -179,7 +173,7 @@ fn contenders(
     let mut contenders: Vec<Box<Drawer>> = vec![Box::new(Rayward {
         casters: CasterPolicy::Auto,
     })];
-    if options.kinds.contains(&FrameKind::EyeHard) {
+    if options.kinds.iter().any(|&kind| kind != FrameKind::Eye) {
         contenders.push(Box::new(Rayward {
             casters: CasterPolicy::Both,
         }));

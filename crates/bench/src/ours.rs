@@ -1,13 +1,18 @@
-//! Rayward as a contender: every structure is built anew in every frame.
+//! Rayward as a contender: every structure is built anew in every frame. What depends on which vertices make a triangle,
+//! not on where they are, is kept as a renderer keeps it: clusters and components.
+//!
+//! Hard shadows are found for all pixels at once, after the eye rays; soft ones tile by tile.
+
+use std::sync::Mutex;
 
 use rayon::prelude::*;
 use rayward::trace::{
-    BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Light, LightGridOptions, PointLightGrid, Receiver,
-    ShadowScratch, Tile, TileHits, Triangles, View, darken, exact,
+    AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Facets, Light, LightQuery,
+    LitPixels, Receiver, Tile, TileHits, View, Visibility, darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
-use crate::contender::{Contender, FrameKind, Job};
+use crate::contender::{Contender, FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::{Picture, Time};
 
 /// Rayward with one choice of casters.
@@ -15,17 +20,6 @@ use crate::{Picture, Time};
 pub(crate) struct Rayward {
     /// Which sides of triangles cast.
     pub(crate) casters: CasterPolicy,
-}
-
-/// Working memory of a thread.
-#[derive(Default)]
-struct Work {
-    hits: TileHits,
-    receivers: Vec<Receiver>,
-    places: Vec<u16>,
-    shadow: Vec<bool>,
-    scratch: ShadowScratch,
-    lit: Vec<[u8; BLOCK_LANES]>,
 }
 
 /// Side of the tiles of all pictures.
@@ -50,114 +44,174 @@ impl Contender for Rayward {
     }
 
     fn draw(&self, job: &Job, picture: &mut Picture) -> u64 {
-        let triangles = job.scene.triangles();
-        let eye = EyeGrid::build_clustered(
-            job.view,
-            triangles,
-            &job.scene.clusters,
-            EyeGridOptions::default(),
-            job.level,
-        );
-        let light = match job.kind {
-            FrameKind::Eye => None,
-            FrameKind::EyeHard => Some(self.light_grid(job, job.light)),
-        };
-        let facets = job.facets();
-        let tiles = picture.tiles_mut().map_init(Work::default, |work, out| {
-            let tile = eye.tile(out.index);
-            eye.trace_tile(&tile, &mut work.hits);
-            facets.shade(&work.hits, out.corner, out.stride, out.blocks);
-            let Some(light) = &light else {
-                return 0;
-            };
-            let asked = work.ask(&eye, &triangles, &tile, light);
-            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
-                darken(block, lit, 1);
+        let (eye, facets) = (eye_grid(job), job.facets());
+        match job.kind {
+            FrameKind::Eye => {
+                picture.tiles_mut().for_each_init(TileHits::default, |hits, out| {
+                    eye.trace_tile(&eye.tile(out.index), hits);
+                    facets.shade(hits, out.corner, out.stride, out.blocks);
+                });
+                0
             }
-            asked
-        });
-        tiles.sum()
+            FrameKind::EyeHard => self.draw_hard(job, &eye, &facets, picture),
+            FrameKind::EyeSoft => self.draw_soft(job, &eye, &facets, picture),
+        }
     }
+}
+
+/// The camera's grid.
+pub(crate) fn eye_grid<'s>(job: &Job<'s>) -> EyeGrid<'s> {
+    let options = EyeGridOptions::default();
+    EyeGrid::build_clustered(
+        job.view,
+        job.scene.triangles(),
+        &job.scene.clusters,
+        options,
+        job.level,
+    )
 }
 
 impl Rayward {
-    /// Eye rays and a shadow ray from every hit to each of these lights, without shading; gives the number of shadow
-    /// rays.
+    fn draw_hard(&self, job: &Job, eye: &EyeGrid, facets: &Facets, picture: &mut Picture) -> u64 {
+        let mut tiles: Vec<_> = picture.tiles_mut().map(Mutex::new).collect();
+        let visibility = Visibility::trace_and(eye, &|tile: &Tile, hits: &TileHits| {
+            let mut out = tiles[tile.index as usize].lock().expect("no tile panics");
+            let out = &mut *out;
+            facets.shade(hits, out.corner, out.stride, out.blocks);
+        });
+        let lit = self.lit(job, &visibility, job.light);
+        tiles.par_iter_mut().for_each(|tile| {
+            let tile = tile.get_mut().expect("no tile panics");
+            for (block, &lit) in tile.blocks.iter_mut().zip(lit.blocks(tile.index)) {
+                darken_unlit(block, lit);
+            }
+        });
+        lit.counts.receivers
+    }
+
+    /// Which pixels a light reaches, caster rules included.
+    pub(crate) fn lit(&self, job: &Job, visibility: &Visibility, light: Light) -> LitPixels {
+        self.with_rule(job, light, |rule| {
+            let query = LightQuery {
+                light,
+                cone: None,
+                eye: Light::Point(job.view.center),
+                rule,
+            };
+            LitPixels::find(visibility, &job.scene.triangles(), &query, job.level)
+        })
+    }
+
+    /// Eye rays and a shadow ray from every hit to each of these lights, one light at a time, without shading; gives
+    /// the number of shadow rays.
     pub(crate) fn ask_lights(&self, job: &Job, lights: &[Light]) -> u64 {
+        let visibility = Visibility::trace(&eye_grid(job), &|| ());
+        let lit = lights.iter().map(|&light| self.lit(job, &visibility, light));
+        lit.map(|lit| lit.counts.receivers).sum()
+    }
+
+    fn draw_soft(&self, job: &Job, eye: &EyeGrid, facets: &Facets, picture: &mut Picture) -> u64 {
         let triangles = job.scene.triangles();
-        let eye = EyeGrid::build_clustered(
-            job.view,
-            triangles,
-            &job.scene.clusters,
-            EyeGridOptions::default(),
-            job.level,
-        );
-        let grids: Vec<_> = lights.iter().map(|&light| self.light_grid(job, light)).collect();
-        let tiles = (0..eye.tile_count())
-            .into_par_iter()
-            .map_init(Work::default, |work, index| {
-                let tile = eye.tile(index);
-                eye.trace_tile(&tile, &mut work.hits);
-                work.receive(eye.view(), &triangles, &tile);
-                for grid in &grids {
-                    grid.shadowed(&work.receivers, &mut work.scratch, &mut work.shadow);
-                }
-                (work.receivers.len() * grids.len()) as u64
-            });
+        // Only both sides cast the shadow of a light with a size.
+        let tree = AreaLightTree::build(job.area, triangles, &|_| Casts::Both, job.level);
+        let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
+            let tile = eye.tile(out.index);
+            eye.trace_tile(&tile, &mut work.hits);
+            facets.shade(&work.hits, out.corner, out.stride, out.blocks);
+            work.receive(&job.view, facets, &tile, job);
+            let scratch = &mut work.scratch;
+            tree.visible(
+                &work.receivers,
+                &work.pixels,
+                &job.samples,
+                scratch,
+                &mut work.bits,
+            );
+            let bits = work.bits.chunks(job.samples.words());
+            for (&place, bits) in work.places.iter().zip(bits) {
+                let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
+                let place = usize::from(place);
+                work.lit[place / BLOCK_LANES][place % BLOCK_LANES] = count as u8;
+            }
+            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
+                darken(block, lit, SOFT_SAMPLES as u8);
+            }
+            work.receivers.len() as u64 * u64::from(SOFT_SAMPLES)
+        });
         tiles.sum()
     }
 
-    /// One light's grid, caster rules included.
-    pub(crate) fn light_grid<'s>(&self, job: &Job<'s>, light: Light) -> PointLightGrid<'s> {
-        let (scene, options) = (job.scene, LightGridOptions::default());
-        let triangles = scene.triangles();
+    /// What each triangle casts in this light, given to `use_it`.
+    fn with_rule<R>(
+        &self,
+        job: &Job,
+        light: Light,
+        use_it: impl FnOnce(&(dyn Fn(u32) -> Casts + Sync)) -> R,
+    ) -> R {
         if self.casters == CasterPolicy::Both {
-            return PointLightGrid::build(light, triangles, &|_| Casts::Both, options, job.level);
+            return use_it(&|_| Casts::Both);
         }
-        let eye = job.view.center.as_dvec3();
-        let rules = CasterRules::new(
-            &scene.scene,
-            &scene.geometry,
-            &scene.topology,
-            self.casters,
-            Some(eye),
-        );
+        let (scene, eye) = (job.scene, job.view.center.as_dvec3());
+        let (policy, topology) = (self.casters, &scene.topology);
+        let rules = CasterRules::new(&scene.scene, &scene.geometry, topology, policy, Some(eye));
         let rule = rules.for_light(&scene.geometry, &light);
-        PointLightGrid::build(light, triangles, &rule, options, job.level)
+        use_it(&rule)
     }
 }
 
-impl Work {
-    /// Asks a light about every hit of a tile; `lit` holds the answers.
-    fn ask(&mut self, eye: &EyeGrid, triangles: &Triangles, tile: &Tile, light: &PointLightGrid) -> u64 {
-        self.receive(eye.view(), triangles, tile);
-        light.shadowed(&self.receivers, &mut self.scratch, &mut self.shadow);
-        for (&place, &shadow) in self.places.iter().zip(&self.shadow) {
-            let place = usize::from(place);
-            self.lit[place / BLOCK_LANES][place % BLOCK_LANES] = u8::from(!shadow);
-        }
-        self.receivers.len() as u64
-    }
+/// Working memory of a thread for soft shadows.
+#[derive(Default)]
+struct SoftWork {
+    hits: TileHits,
+    receivers: Vec<Receiver>,
+    pixels: Vec<u32>,
+    /// Block and lane of each receiver.
+    places: Vec<u16>,
+    bits: Vec<u32>,
+    scratch: AreaScratch,
+    lit: Vec<[u8; BLOCK_LANES]>,
+}
 
-    fn receive(&mut self, view: &View, triangles: &Triangles, tile: &Tile) {
+impl SoftWork {
+    /// The hits of a tile that are turned towards the light: blocks of 8 x 8 pixels, in these squares of 4 x 4.
+    fn receive(&mut self, view: &View, facets: &Facets, tile: &Tile, job: &Job) {
         self.receivers.clear();
+        self.pixels.clear();
         self.places.clear();
         let (columns, rows) = (tile.width.div_ceil(4), tile.height.div_ceil(4));
         self.lit.clear();
         self.lit.resize((columns * rows) as usize, [0; BLOCK_LANES]);
-        for i in 0..self.lit.len() {
-            let (column, row) = (i as u32 % columns, i as u32 / columns);
-            for (lane, &prim) in self.hits.block(column, row).prim.iter().enumerate() {
-                let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
-                if prim == u32::MAX || x >= tile.width || y >= tile.height {
-                    continue;
-                }
-                let ray = view.pixel_ray(tile.x + x, tile.y + y);
-                let corners = triangles.corners(prim);
-                if let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) {
-                    self.receivers.push(Receiver::along(&ray, hit.t, prim));
-                    self.places.push((i * BLOCK_LANES + lane) as u16);
-                }
+        for i in 0..columns.next_multiple_of(2) * rows.next_multiple_of(2) {
+            let (square, part) = (i / 4, i % 4);
+            let across = columns.div_ceil(2);
+            let column = square % across * 2 + part % 2;
+            let row = square / across * 2 + part / 2;
+            if column < columns && row < rows {
+                self.receive_block(view, facets, tile, (job, columns), [column, row]);
+            }
+        }
+    }
+
+    fn receive_block(
+        &mut self,
+        view: &View,
+        facets: &Facets,
+        tile: &Tile,
+        (job, columns): (&Job, u32),
+        [column, row]: [u32; 2],
+    ) {
+        let triangles = job.scene.triangles();
+        let block = (row * columns + column) as usize;
+        for (lane, &prim) in self.hits.block(column, row).prim.iter().enumerate() {
+            let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
+            if prim == u32::MAX || x >= tile.width || y >= tile.height || facets.facet(prim) <= 0.0 {
+                continue;
+            }
+            let ray = view.pixel_ray(tile.x + x, tile.y + y);
+            if let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)) {
+                self.receivers.push(Receiver::along(&ray, hit.t, prim));
+                self.pixels.push(sample_set(tile.x + x, tile.y + y));
+                self.places.push((block * BLOCK_LANES + lane) as u16);
             }
         }
     }

@@ -15,6 +15,14 @@ pub(crate) type Lanes<T> = [T; LANES];
 #[repr(C, align(64))]
 pub(crate) struct Valid(pub(crate) Lanes<i32>);
 
+impl Valid {
+    /// How many are asked about.
+    #[inline]
+    pub(crate) fn count(&self) -> u64 {
+        self.0.iter().filter(|&&v| v != 0).count() as u64
+    }
+}
+
 /// Sixteen rays: origin and direction by component; hits lie beyond `near` and before `far`.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]

@@ -105,7 +105,7 @@ pub fn measure(options: &ScalingOptions, progress: &mut dyn FnMut(&str)) -> Resu
         let points = sizes.resolutions.iter().map(|&size| {
             progress(&format!("resolution {}x{}, {}", size[0], size[1], kind.name()));
             let value = u64::from(size[0]) * u64::from(size[1]);
-            one_thread(options, &job(&scene, size, kind, options)?, value, 1)
+            one_thread(options, &Job::new(&scene, size, kind, options.level)?, value, 1)
         });
         curves.push(Curve {
             parameter: "pixels",
@@ -114,7 +114,7 @@ pub fn measure(options: &ScalingOptions, progress: &mut dyn FnMut(&str)) -> Resu
             points: points.collect::<Result<_>>()?,
         });
     }
-    let hard = job(&scene, sizes.usual, FrameKind::EyeHard, options)?;
+    let hard = Job::new(&scene, sizes.usual, FrameKind::EyeHard, options.level)?;
     let points = sizes.lights.iter().map(|&lights| {
         progress(&format!("lights {lights}"));
         one_thread(options, &hard, lights as u64, lights)
@@ -155,7 +155,7 @@ fn against_triangles(
         let scene = BenchScene::new("blob", rayward::scene::builtin::blob_of(frequency), None)?;
         points.push(one_thread(
             options,
-            &job(&scene, sizes.usual, kind, options)?,
+            &Job::new(&scene, sizes.usual, kind, options.level)?,
             triangles,
             1,
         )?);
@@ -165,21 +165,6 @@ fn against_triangles(
         scene: "blob".into(),
         frame: kind.name(),
         points,
-    })
-}
-
-fn job<'s>(
-    scene: &'s BenchScene,
-    [width, height]: [u32; 2],
-    kind: FrameKind,
-    options: &ScalingOptions,
-) -> Result<Job<'s>> {
-    Ok(Job {
-        scene,
-        view: scene.view(width, height)?,
-        light: scene.light(),
-        kind,
-        level: options.level,
     })
 }
 

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
-use rayward::CameraFrame;
 use rayward::scene::{
     self, CameraEntry, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight, Scene, builtin,
 };
-use rayward::trace::{Clusters, Light, Topology, Triangles, View};
+use rayward::trace::{AreaLight, Clusters, Light, Topology, Triangles, View};
+use rayward::{CameraFrame, FramePlan, RenderOptions};
 
 use crate::{Error, Result};
 
@@ -54,6 +54,7 @@ pub struct BenchScene {
     pub clusters: Clusters,
     camera: PosedCamera,
     light: PosedLight,
+    area: AreaLight,
 }
 
 impl BenchScene {
@@ -112,7 +113,14 @@ impl BenchScene {
         let mut lights = entry.map_or(Vec::new(), CameraEntry::lights);
         lights.extend(geometry.lights.iter().cloned());
         lights.extend(scene::default_lights(&camera));
-        let light = lights.into_iter().next().expect("there are default lights");
+        let rectangle = |light: &&PosedLight| matches!(light.kind, LightKind::Rectangle { .. });
+        let square = square_at(&lights[0], &geometry);
+        let area = posed_area(&geometry, lights.iter().find(rectangle).unwrap_or(&square));
+        let area = area.ok_or(Error::Scene {
+            name: name.into(),
+            problem: "its area light has no area",
+        })?;
+        let light = lights.swap_remove(0);
         let topology = Topology::analyse(&triangles_of(&geometry));
         let clusters = Clusters::new(&triangles_of(&geometry));
         Ok(Self {
@@ -123,6 +131,7 @@ impl BenchScene {
             clusters,
             camera,
             light,
+            area,
         })
     }
 
@@ -152,6 +161,11 @@ impl BenchScene {
         }
     }
 
+    /// Its area light: the first rectangle among its lights, or else a square in the place of its light.
+    pub fn area_light(&self) -> AreaLight {
+        self.area
+    }
+
     /// Lights on a circle around the line from the middle of the scene to its light, for scenes with many.
     pub fn lights_around(&self, number: usize) -> Vec<Light> {
         let (low, high) = self.geometry.bounds().unwrap_or_default();
@@ -173,6 +187,28 @@ impl BenchScene {
     fn local(&self, point: DVec3) -> Vec3 {
         (point - self.geometry.origin).as_vec3()
     }
+}
+
+fn posed_area(geometry: &FrameGeometry, light: &PosedLight) -> Option<AreaLight> {
+    let plan = FramePlan::new(geometry, std::slice::from_ref(light), &RenderOptions::default());
+    plan.lights[0].as_ref()?.area
+}
+
+/// A square in the place of a light, a tenth of its distance wide, that faces the middle of the scene.
+fn square_at(light: &PosedLight, geometry: &FrameGeometry) -> PosedLight {
+    let (low, high) = geometry.bounds().unwrap_or_default();
+    let middle = geometry.origin + (low + high).as_dvec3() * 0.5;
+    let position = match light.kind {
+        LightKind::Directional { .. } => middle - light.direction * f64::from((high - low).length()),
+        _ => light.position,
+    };
+    let mut square = scene::point_light_for(position, middle);
+    let side = (position.distance(middle) * 0.1) as f32;
+    square.kind = LightKind::Rectangle {
+        width: side,
+        height: side,
+    };
+    square
 }
 
 fn triangles_of(geometry: &FrameGeometry) -> Triangles<'_> {

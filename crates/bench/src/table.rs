@@ -269,11 +269,12 @@ pub fn scaling_csv(report: &ScalingReport) -> String {
     table.csv()
 }
 
-/// The three pieces of work of a scene, with their names.
-fn pieces(scene: &SceneBuilds) -> [(&'static str, &Scaled); 3] {
+/// The pieces of work of a scene, with their names.
+fn pieces(scene: &SceneBuilds) -> [(&'static str, &Scaled); 4] {
     [
         ("eye grid", &scene.eye_grid),
-        ("light grid", &scene.light_grid),
+        ("binning of all", &scene.binning),
+        ("hard shadows", &scene.shadows),
         ("frame eye+hard", &scene.frame),
     ]
 }

@@ -50,7 +50,7 @@ struct FramesArgs {
     /// Built-in scenes, scenes of the scenes folder by name, or files; all that are there unless given
     scenes: Vec<String>,
     /// Kinds of frames
-    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_values = ["eye", "eye+hard"])]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', default_values = ["eye", "eye+hard", "eye+soft8"])]
     frames: Vec<Kind>,
     /// Width and height of the pictures
     #[arg(long, value_name = "WxH", value_parser = values::size, default_value = "1920x1200")]
@@ -126,6 +126,9 @@ enum Kind {
     /// Eye rays, and a hard shadow ray from every hit
     #[value(name = "eye+hard")]
     EyeHard,
+    /// Eye rays, and eight shadow rays from every hit to an area light
+    #[value(name = "eye+soft8")]
+    EyeSoft,
 }
 
 impl From<Kind> for FrameKind {
@@ -133,6 +136,7 @@ impl From<Kind> for FrameKind {
         match kind {
             Kind::Eye => Self::Eye,
             Kind::EyeHard => Self::EyeHard,
+            Kind::EyeSoft => Self::EyeSoft,
         }
     }
 }

@@ -138,6 +138,19 @@ pub fn darken(block: &mut [u8; BLOCK_LANES], lit: &[u8; BLOCK_LANES], samples: u
     }
 }
 
+/// Takes all light from those pixels of a shaded block whose bit is not set.
+#[inline]
+pub fn darken_unlit(block: &mut [u8; BLOCK_LANES], lit: u16) {
+    if lit == u16::MAX {
+        return;
+    }
+    for (lane, value) in block.iter_mut().enumerate() {
+        if lit & 1 << lane == 0 {
+            *value = (*value).min(DARK as u8);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DVec3, Vec3};
@@ -242,5 +255,20 @@ mod tests {
                 check(view, Light::Directional(Vec3::new(0.5, 1.0, 1.5)), level);
             }
         }
+    }
+
+    #[test]
+    fn light_is_taken_where_it_does_not_reach() {
+        let mut block: [u8; BLOCK_LANES] = std::array::from_fn(|i| (i * 17) as u8);
+        let bright = block;
+        darken_unlit(&mut block, u16::MAX);
+        assert_eq!(block, bright);
+        darken_unlit(&mut block, 1 << 15 | 1);
+        assert_eq!(block[..4], [0, 17, 32, 32]);
+        assert_eq!(block[15], 255);
+        let mut quarter = bright;
+        darken(&mut quarter, &[2; BLOCK_LANES], 8);
+        assert_eq!(quarter[..3], [0, 17, 32]);
+        assert_eq!(quarter[15], 32 + 223 / 4);
     }
 }

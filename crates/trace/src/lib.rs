@@ -62,7 +62,7 @@ pub use bvh::Bvh;
 pub use clusters::Clusters;
 pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use faces::FaceOptions;
-pub use facets::{BLOCK_LANES, Facets, HitBlocks, darken};
+pub use facets::{BLOCK_LANES, Facets, HitBlocks, darken, darken_unlit};
 pub use grid3::{Grid3, RaySpan};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;

@@ -34,12 +34,17 @@ impl Visibility {
     /// Traces all tiles of a grid, on all threads of the current rayon pool; `done` is told after each, from any
     /// thread.
     pub fn trace(grid: &EyeGrid, done: &(dyn Fn() + Sync)) -> Self {
+        Self::trace_and(grid, &|_, _| done())
+    }
+
+    /// As [`Self::trace`], giving each tile and its hits to `use_it`, from any thread.
+    pub fn trace_and(grid: &EyeGrid, use_it: &(dyn Fn(&Tile, &TileHits) + Sync)) -> Self {
         let traced: Vec<(VisibleTile, u64)> = (0..grid.tile_count())
             .into_par_iter()
             .map_init(TileHits::default, |hits, index| {
                 let tile = grid.tile(index);
                 grid.trace_tile(&tile, hits);
-                done();
+                use_it(&tile, hits);
                 (VisibleTile::of(tile, hits), hits.exact_pixels as u64)
             })
             .collect();

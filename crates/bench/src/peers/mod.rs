@@ -6,9 +6,9 @@
 mod obvhs;
 
 use rayon::prelude::*;
-use rayward::trace::{BLOCK_LANES, HitBlocks, Light, View, darken};
+use rayward::trace::{BLOCK_LANES, Facets, HitBlocks, Light, View, darken};
 
-use crate::contender::{Contender, FrameKind, Job};
+use crate::contender::{Contender, FrameKind, Job, PATTERN, SOFT_SAMPLES};
 use crate::packet::{LANES, Lanes, NOTHING, Packet, Rays, Valid};
 use crate::{Picture, Time};
 
@@ -117,19 +117,24 @@ impl<T: PacketTracer> Contender for Peer<T> {
                 self.tracer.closest(&Valid([-1; LANES]), &mut work.eye);
                 work.prim[block] = work.eye.hits.prim;
                 work.depth[block] = work.eye.rays.far;
-                if job.kind == FrameKind::EyeHard {
-                    asked += self.ask(job.light, block, work);
-                }
+                asked += match job.kind {
+                    FrameKind::Eye => 0,
+                    FrameKind::EyeHard => self.ask(job.light, &facets, block, work),
+                    FrameKind::EyeSoft => self.ask_area(job, &facets, corner, block, work),
+                };
             }
             let hits = TileOfPeer {
                 stride: out.stride,
                 work,
             };
             facets.shade(&hits, out.corner, out.stride, out.blocks);
-            if job.kind == FrameKind::EyeHard {
-                for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
-                    darken(block, lit, 1);
-                }
+            let samples = match job.kind {
+                FrameKind::Eye => return asked,
+                FrameKind::EyeHard => 1,
+                FrameKind::EyeSoft => SOFT_SAMPLES as u8,
+            };
+            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
+                darken(block, lit, samples);
             }
             asked
         });
@@ -138,40 +143,91 @@ impl<T: PacketTracer> Contender for Peer<T> {
 }
 
 impl<T: PacketTracer> Peer<T> {
-    /// One shadow ray from every hit of a block.
+    /// One shadow ray from every hit of a block that is turned towards the light.
     #[inline]
-    fn ask(&self, light: Light, block: usize, work: &mut Work) -> u64 {
-        let (eye, shadow) = (&work.eye, &mut work.shadow.rays);
-        let valid = Valid(eye.hits.prim.map(|prim| if prim == NOTHING { 0 } else { -1 }));
-        let asked = valid.0.iter().filter(|&&v| v != 0).count();
-        if asked == 0 {
-            work.lit[block] = [0; LANES];
+    fn ask(&self, light: Light, facets: &Facets, block: usize, work: &mut Work) -> u64 {
+        work.lit[block] = [0; LANES];
+        let Some((valid, depth)) = turned_to_light(&work.eye, facets) else {
             return 0;
-        }
-        let depth = eye.hits.prim.map(|prim| prim != NOTHING);
-        let depth: Lanes<f32> = std::array::from_fn(|l| if depth[l] { eye.rays.far[l] } else { 0.0 });
-        for i in 0..3 {
-            let point: Lanes<f32> =
-                std::array::from_fn(|l| eye.rays.origin[i][l] + depth[l] * eye.rays.dir[i][l]);
-            shadow.dir[i] = match light {
-                Light::Point(p) => point.map(|v| p[i] - v),
-                Light::Directional(d) => [d[i]; LANES],
-            };
-            shadow.origin[i] = point;
-        }
+        };
+        work.shadow.rays.origin = points(&work.eye, &depth);
+        let shadow = &mut work.shadow.rays;
         match light {
-            Light::Point(_) => {
-                shadow.near = [CUT; LANES];
-                shadow.far = [1.0 - CUT; LANES];
-            }
-            Light::Directional(_) => {
+            Light::Point(p) => aim_at(shadow, &[[p.x; LANES], [p.y; LANES], [p.z; LANES]]),
+            Light::Directional(d) => {
+                shadow.dir = [[d.x; LANES], [d.y; LANES], [d.z; LANES]];
                 shadow.near = depth.map(|d| CUT * d);
                 shadow.far = [f32::INFINITY; LANES];
             }
         }
         self.tracer.occluded(&valid, shadow);
-        let open = |l: usize| u8::from(valid.0[l] != 0 && shadow.far[l] >= 0.0);
-        work.lit[block] = std::array::from_fn(open);
-        asked as u64
+        work.lit[block] = std::array::from_fn(|l| open(&valid, shadow, l));
+        valid.count()
     }
+
+    /// Shadow rays to the points of the area light, sixteen pixels at a time.
+    #[inline]
+    fn ask_area(&self, job: &Job, facets: &Facets, corner: [u32; 2], block: usize, work: &mut Work) -> u64 {
+        work.lit[block] = [0; LANES];
+        let Some((mut valid, depth)) = turned_to_light(&work.eye, facets) else {
+            return 0;
+        };
+        let asked = valid.count() * u64::from(SOFT_SAMPLES);
+        work.shadow.rays.origin = points(&work.eye, &depth);
+        let (normal, center) = (job.area.normal().as_vec3(), job.area_center());
+        let shadow = &mut work.shadow.rays;
+        for l in 0..LANES {
+            let offset: f32 = (0..3)
+                .map(|i| (shadow.origin[i][l] - center[i]) * normal[i])
+                .sum();
+            // What is behind the light gets nothing of it.
+            valid.0[l] &= -i32::from(offset > 0.0);
+        }
+        if valid.count() == 0 {
+            return asked;
+        }
+        let [x, y] = corner.map(|v| v % PATTERN / 4);
+        for ends in &job.points[(y * (PATTERN / 4) + x) as usize] {
+            aim_at(shadow, ends);
+            self.tracer.occluded(&valid, shadow);
+            for (l, lit) in work.lit[block].iter_mut().enumerate() {
+                *lit += open(&valid, shadow, l);
+            }
+        }
+        asked
+    }
+}
+
+/// Which rays have hit a side that is turned towards the light, and the depth of these, 0 elsewhere; `None` if there are
+/// none.
+#[inline]
+fn turned_to_light(eye: &Packet, facets: &Facets) -> Option<(Valid, Lanes<f32>)> {
+    let turned = |prim: u32| prim != NOTHING && facets.facet(prim) > 0.0;
+    let turned = eye.hits.prim.map(turned);
+    let depth = |l: usize| if turned[l] { eye.rays.far[l] } else { 0.0 };
+    let valid = Valid(turned.map(|turned| -i32::from(turned)));
+    (valid.count() > 0).then(|| (valid, std::array::from_fn(depth)))
+}
+
+/// Points at these depths.
+#[inline]
+fn points(eye: &Packet, depth: &Lanes<f32>) -> [Lanes<f32>; 3] {
+    let along = |i: usize, l: usize| eye.rays.origin[i][l] + depth[l] * eye.rays.dir[i][l];
+    std::array::from_fn(|i| std::array::from_fn(|l| along(i, l)))
+}
+
+/// Aims rays at these ends.
+#[inline]
+fn aim_at(rays: &mut Rays, ends: &[Lanes<f32>; 3]) {
+    for i in 0..3 {
+        rays.dir[i] = std::array::from_fn(|l| ends[i][l] - rays.origin[i][l]);
+    }
+    rays.near = [CUT; LANES];
+    rays.far = [1.0 - CUT; LANES];
+}
+
+/// 1 for a ray that was asked about and met nothing.
+#[inline]
+fn open(valid: &Valid, rays: &Rays, lane: usize) -> u8 {
+    u8::from(valid.0[lane] != 0 && rays.far[lane] >= 0.0)
 }

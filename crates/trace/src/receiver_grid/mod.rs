@@ -152,6 +152,12 @@ impl LitPixels {
         tile.lit[block] & 1 << lane != 0
     }
 
+    /// Of a tile, a bit for each pixel of each block of 4 x 4, blocks in rows; pixel (x, y) of a block is bit
+    /// `y * 4 + x`.
+    pub fn blocks(&self, tile: u32) -> &[u16] {
+        &self.tiles[tile as usize].lit
+    }
+
     /// Tests every caster for every pixel.
     fn one_by_one(visibility: &Visibility, triangles: &Triangles, query: &LightQuery) -> Self {
         let casts = |prim: &u32| {
