@@ -107,14 +107,13 @@ fn light_points(area: &AreaLight, samples: &Samples) -> LightPoints {
     let block = |block: u32| {
         let corner = [block % blocks * 4, block / blocks * 4];
         std::array::from_fn(|k| {
-            let mut points = [[0.0; LANES]; 3];
-            for lane in 0..LANES {
+            let ends: [[f32; 3]; LANES] = std::array::from_fn(|lane| {
                 let pixel = sample_set(corner[0] + lane as u32 % 4, corner[1] + lane as u32 / 4);
                 let end = area.sample(samples, pixel, DVec3::ZERO, k as u32);
                 let (Light::Point(end) | Light::Directional(end)) = end;
-                (0..3).for_each(|axis| points[axis][lane] = end[axis]);
-            }
-            points
+                end.to_array()
+            });
+            std::array::from_fn(|axis| ends.map(|end| end[axis]))
         })
     };
     (0..blocks * blocks).map(block).collect()

@@ -219,8 +219,8 @@ fn points(eye: &Packet, depth: &Lanes<f32>) -> [Lanes<f32>; 3] {
 /// Aims rays at these ends.
 #[inline]
 fn aim_at(rays: &mut Rays, ends: &[Lanes<f32>; 3]) {
-    for i in 0..3 {
-        rays.dir[i] = std::array::from_fn(|l| ends[i][l] - rays.origin[i][l]);
+    for ((dir, end), origin) in rays.dir.iter_mut().zip(ends).zip(&rays.origin) {
+        *dir = std::array::from_fn(|l| end[l] - origin[l]);
     }
     rays.near = [CUT; LANES];
     rays.far = [1.0 - CUT; LANES];
