@@ -104,7 +104,7 @@ impl<'a> MovingTriangles<'a> {
     }
 }
 
-/// Perspective grids over moving triangles. See the [module](self).
+/// Perspective grids over moving triangles.
 #[derive(Clone, Debug)]
 pub struct MovingGrids<'a> {
     triangles: MovingTriangles<'a>,

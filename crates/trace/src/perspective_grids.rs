@@ -16,7 +16,7 @@ use crate::grid3::{self, Outline, RaySpan};
 use crate::queries::{self, Candidates};
 use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles, ViewRay};
 
-/// Perspective grids around a center, over the triangles of one frame. See the [module](self).
+/// Perspective grids around a center, over the triangles of one frame.
 #[derive(Clone, Debug)]
 pub struct PerspectiveGrids<'a> {
     triangles: Triangles<'a>,

@@ -39,7 +39,7 @@ pub(crate) use walk::{SpaceGrid, Walk};
 /// Cells of a grid at most; a finer resolution is halved along its longest axis until it fits.
 const MOST_CELLS: u64 = 1 << 26;
 
-/// A 3-D grid over the triangles of one frame. See the [module](self).
+/// A 3-D grid over the triangles of one frame.
 #[derive(Clone, Debug)]
 pub struct Grid3<'a, S> {
     triangles: Triangles<'a>,
