@@ -1,11 +1,12 @@
-//! Processor time of the process and wall time.
+//! Processor time of the threads that work, and wall time.
 
 use std::time::{Duration, Instant};
 
 /// What something took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Time {
-    /// Processor time of all threads of the process; wall time where the system does not tell it.
+    /// Processor time of the threads of the pool that it was measured in, or else of the calling thread; wall time where
+    /// the system does not tell it. Threads that a peer's library started and that wait in a loop are not in it.
     pub cpu: Duration,
     /// Wall time.
     pub wall: Duration,
@@ -44,8 +45,15 @@ impl Stopwatch {
 
 #[cfg(unix)]
 fn cpu_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+    let of_thread = || {
+        let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+        Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
+    };
+    if rayon::current_thread_index().is_some() {
+        rayon::broadcast(|_| of_thread()).into_iter().sum()
+    } else {
+        of_thread()
+    }
 }
 
 #[cfg(not(unix))]

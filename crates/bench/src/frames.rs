@@ -51,7 +51,7 @@ impl Default for FramesOptions {
 pub struct FramesReport {
     /// What it was measured on.
     pub machine: Machine,
-    /// Versions of Embree that were found.
+    /// Versions of Embree that were found, with the width of their packets.
     pub embree: Vec<String>,
     /// Width of the pictures.
     pub width: u32,
@@ -97,7 +97,7 @@ pub struct Row {
     pub differing_pixels: u64,
     /// Whether these are few enough for times to be told.
     pub same_picture: bool,
-    /// Processor time of building what is kept between frames, milliseconds; it is in no frame's time.
+    /// Wall time of building what is kept between frames, milliseconds; it is in no frame's time.
     pub kept_build_ms: Option<f64>,
     /// Times of the frame, ours with all builds; `None` if the picture is another one.
     pub times: Option<Times>,
@@ -144,7 +144,7 @@ pub fn measure(
         .build()?;
     let mut report = FramesReport {
         machine: Machine::describe(options.level, options.threads),
-        embree: libraries.iter().map(Library::version).collect(),
+        embree: libraries.iter().map(Library::description).collect(),
         width: options.width,
         height: options.height,
         runs: options.runs,
@@ -215,7 +215,7 @@ fn measure_frame(job: &Job, contenders: &[Box<Drawer>], runs: usize, pictures: P
             ours: contender.build().is_none(),
             differing_pixels: difference.pixels,
             same_picture: share <= TOLERATED_SHARE,
-            kept_build_ms: contender.build().map(|t| t.cpu.as_secs_f64() * 1e3),
+            kept_build_ms: contender.build().map(|t| t.wall.as_secs_f64() * 1e3),
             times: None,
             mray_per_s: None,
             over_rayward: None,

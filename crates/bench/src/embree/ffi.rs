@@ -2,7 +2,7 @@
 //!
 //! What is used is declared here by hand from the interface's documentation: handles are opaque pointers, enums are C
 //! ints, and packets have the layout of [`crate::packet`]. Everything outside of this file is safe: a [`Scene`] owns
-//! its device and keeps its library loaded, its buffers are filled before they are committed, and packets are of the
+//! its device, the library stays loaded, its buffers are filled before they are committed, and packets are of the
 //! size and alignment that the interface asks for.
 #![allow(
     unsafe_code,
@@ -32,8 +32,10 @@ const ROBUST: c_int = 1 << 2;
 /// Flag of coherent rays in API 3 and in API 4.
 const COHERENT_3: c_int = 1;
 const COHERENT_4: c_int = 1 << 16;
-/// Device property: the version as one number, 40403 for 4.4.3.
+/// Device properties: the version as one number, 40403 for 4.4.3; whether packets of 8 and 16 are native.
 const VERSION: c_int = 0;
+const NATIVE_8: c_int = 33;
+const NATIVE_16: c_int = 34;
 
 /// `RTCIntersectContext` of API 3, with room for several levels of instances.
 #[repr(C)]
@@ -82,8 +84,9 @@ struct Functions {
     commit_geometry: OfHandle,
     new_buffer: NewBuffer,
     attach: Attach,
-    intersect: Query,
-    occluded: Query,
+    /// For packets of 4, 8 and 16.
+    intersect: [Query; 3],
+    occluded: [Query; 3],
 }
 
 /// A loaded library.
@@ -92,8 +95,8 @@ pub(super) struct Embree {
     /// 3 or 4.
     major: isize,
     version: isize,
-    /// Keeps the code of `functions` in memory.
-    _library: Library,
+    /// Rays of the widest packet that is not taken apart: 16, 8 or 4.
+    width: usize,
 }
 
 impl Embree {
@@ -102,25 +105,37 @@ impl Embree {
         // SAFETY: loading runs the initialisers of the library. Whoever names one trusts it, as with any program.
         let library = unsafe { Library::new(name) }.map_err(|error| error.to_string())?;
         let functions = Functions::of(&library).map_err(|error| error.to_string())?;
+        // Never unloaded: its threads may outlive every device, and their code must not go from under them.
+        std::mem::forget(library);
         let mut embree = Self {
             functions,
             major: 0,
             version: 0,
-            _library: library,
+            width: 4,
         };
         let device = embree.device(1)?;
         // SAFETY: `device` is a live handle of this library.
-        embree.version = unsafe {
-            let version = (embree.functions.device_property)(device.as_ptr(), VERSION);
-            (embree.functions.release_device)(device.as_ptr());
-            version
+        let property = |name| unsafe { (embree.functions.device_property)(device.as_ptr(), name) };
+        let version = property(VERSION);
+        let width = match (property(NATIVE_16), property(NATIVE_8)) {
+            (1, _) => 16,
+            (_, 1) => 8,
+            _ => 4,
         };
+        // SAFETY: as above; nobody else has this device.
+        unsafe { (embree.functions.release_device)(device.as_ptr()) };
+        (embree.version, embree.width) = (version, width);
         embree.major = embree.version / 10_000;
         if embree.major == 3 || embree.major == 4 {
             Ok(embree)
         } else {
             Err(format!("version {} is neither 3 nor 4", embree.version))
         }
+    }
+
+    /// Rays of its packets.
+    pub(super) fn width(&self) -> usize {
+        self.width
     }
 
     /// Its version, for instance 4.4.1.
@@ -148,7 +163,7 @@ impl Embree {
 impl Functions {
     fn of(library: &Library) -> Result<Self, libloading::Error> {
         // SAFETY: the types above are those of the interface, the same in API 3 and 4 up to the meaning of two
-        // pointers of `Query`; the pointers taken out live as long as `Embree`, which owns the library.
+        // pointers of `Query`; a library whose functions are used is never unloaded.
         unsafe {
             Ok(Self {
                 new_device: *library.get::<NewDevice>("rtcNewDevice")?,
@@ -166,8 +181,16 @@ impl Functions {
                 commit_geometry: *library.get::<OfHandle>("rtcCommitGeometry")?,
                 new_buffer: *library.get::<NewBuffer>("rtcSetNewGeometryBuffer")?,
                 attach: *library.get::<Attach>("rtcAttachGeometry")?,
-                intersect: *library.get::<Query>("rtcIntersect16")?,
-                occluded: *library.get::<Query>("rtcOccluded16")?,
+                intersect: [
+                    *library.get::<Query>("rtcIntersect4")?,
+                    *library.get::<Query>("rtcIntersect8")?,
+                    *library.get::<Query>("rtcIntersect16")?,
+                ],
+                occluded: [
+                    *library.get::<Query>("rtcOccluded4")?,
+                    *library.get::<Query>("rtcOccluded8")?,
+                    *library.get::<Query>("rtcOccluded16")?,
+                ],
             })
         }
     }
@@ -245,20 +268,29 @@ impl Scene {
         self.embree.check(self.device, "building")
     }
 
+    /// Rays of a packet that is native here.
+    #[inline]
+    pub(super) fn width(&self) -> usize {
+        self.embree.width
+    }
+
     /// Closest hits of coherent rays.
-    pub(super) fn closest(&self, valid: &Valid, packet: &mut Packet) {
-        self.query(self.embree.functions.intersect, valid, (&raw mut *packet).cast());
+    #[inline]
+    pub(super) fn closest<const N: usize>(&self, valid: &Valid<N>, packet: &mut Packet<N>) {
+        let query = self.embree.functions.intersect[const { of_width::<N>() }];
+        self.query(query, valid.0.as_ptr(), (&raw mut *packet).cast());
     }
 
     /// Any hits of coherent rays.
-    pub(super) fn occluded(&self, valid: &Valid, rays: &mut Rays) {
-        self.query(self.embree.functions.occluded, valid, (&raw mut *rays).cast());
+    #[inline]
+    pub(super) fn occluded<const N: usize>(&self, valid: &Valid<N>, rays: &mut Rays<N>) {
+        let query = self.embree.functions.occluded[const { of_width::<N>() }];
+        self.query(query, valid.0.as_ptr(), (&raw mut *rays).cast());
     }
 
-    /// `packet` is what `query` takes: a [`Packet`] or [`Rays`].
+    /// `valid` and `packet` are what `query` takes: as many lanes as its width, in [`Packet`] or [`Rays`].
     #[inline]
-    fn query(&self, query: Query, valid: &Valid, packet: *mut c_void) {
-        let valid = valid.0.as_ptr();
+    fn query(&self, query: Query, valid: *const c_int, packet: *mut c_void) {
         if self.embree.major == 3 {
             let mut context = Context3 {
                 flags: COHERENT_3,
@@ -282,6 +314,16 @@ impl Scene {
             // SAFETY: as above.
             unsafe { query(valid, self.scene.as_ptr(), packet, arguments) };
         }
+    }
+}
+
+/// Place of the function for packets of this width.
+const fn of_width<const N: usize>() -> usize {
+    match N {
+        4 => 0,
+        8 => 1,
+        16 => 2,
+        _ => panic!("packets have 4, 8 or 16 rays"),
     }
 }
 

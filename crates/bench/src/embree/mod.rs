@@ -1,6 +1,8 @@
 //! Embree, where a shared library of it is on the system: loaded at run time, no build dependency.
 //!
-//! Packets of sixteen rays with the coherent flag. `RAYWARD_EMBREE` names the library, or several as in `PATH`; without
+//! Packets of coherent rays, as wide as the library has them natively on this processor: sixteen with AVX-512, eight with
+//! AVX, four below. Narrower ones are copied from and to the sixteen of a block, which costs some 2 %; wider ones the
+//! library would take apart into single rays. `RAYWARD_EMBREE` names the library, or several as in `PATH`; without
 //! it the usual names are tried, newest first. API 3 and 4 are known.
 
 mod ffi;
@@ -10,7 +12,7 @@ use std::sync::Arc;
 
 use rayward::trace::Triangles;
 
-use crate::packet::{Packet, Rays, Valid};
+use crate::packet::{LANES, NOTHING, Packet, Rays, Valid};
 use crate::peers::{PacketTracer, Peer};
 use crate::{Error, Result, Stopwatch};
 
@@ -106,6 +108,11 @@ impl Library {
         self.embree.version()
     }
 
+    /// Version and width of its packets.
+    pub(crate) fn description(&self) -> String {
+        format!("{}, packets of {} rays", self.version(), self.embree.width())
+    }
+
     /// Builds a structure; the build is that of committing the scene, on that many threads.
     pub(crate) fn build(
         &self,
@@ -137,13 +144,72 @@ impl Library {
 pub(crate) struct Embree(ffi::Scene);
 
 impl PacketTracer for Embree {
+    type Scratch = Parts;
+
     #[inline]
-    fn closest(&self, valid: &Valid, packet: &mut Packet) {
-        self.0.closest(valid, packet);
+    fn closest(&self, valid: &Valid, packet: &mut Packet, parts: &mut Parts) {
+        match self.0.width() {
+            16 => self.0.closest(valid, packet),
+            8 => closest_in_parts(&self.0, valid, packet, &mut parts.eight),
+            _ => closest_in_parts(&self.0, valid, packet, &mut parts.four),
+        }
     }
 
     #[inline]
-    fn occluded(&self, valid: &Valid, rays: &mut Rays) {
-        self.0.occluded(valid, rays);
+    fn occluded(&self, valid: &Valid, rays: &mut Rays, parts: &mut Parts) {
+        match self.0.width() {
+            16 => self.0.occluded(valid, rays),
+            8 => occluded_in_parts(&self.0, valid, rays, &mut parts.eight.rays),
+            _ => occluded_in_parts(&self.0, valid, rays, &mut parts.four.rays),
+        }
     }
+}
+
+/// Narrower packets of a thread.
+#[derive(Default)]
+pub(crate) struct Parts {
+    eight: Packet<8>,
+    four: Packet<4>,
+}
+
+fn closest_in_parts<const N: usize>(
+    scene: &ffi::Scene,
+    valid: &Valid,
+    packet: &mut Packet,
+    part: &mut Packet<N>,
+) {
+    for start in (0..LANES).step_by(N) {
+        let end = start + N;
+        let valid = take(&mut part.rays, &packet.rays, valid, start);
+        part.hits.prim = [NOTHING; N];
+        part.hits.geometry = [NOTHING; N];
+        scene.closest(&valid, part);
+        packet.rays.far[start..end].copy_from_slice(&part.rays.far);
+        packet.hits.prim[start..end].copy_from_slice(&part.hits.prim);
+    }
+}
+
+fn occluded_in_parts<const N: usize>(scene: &ffi::Scene, valid: &Valid, rays: &mut Rays, part: &mut Rays<N>) {
+    for start in (0..LANES).step_by(N) {
+        let valid = take(part, rays, valid, start);
+        if valid.0 != [0; N] {
+            scene.occluded(&valid, part);
+        }
+        rays.far[start..start + N].copy_from_slice(&part.far);
+    }
+}
+
+/// Copies the rays from `start` on into a narrower packet.
+#[inline]
+fn take<const N: usize>(part: &mut Rays<N>, rays: &Rays, valid: &Valid, start: usize) -> Valid<N> {
+    let end = start + N;
+    for i in 0..3 {
+        part.origin[i].copy_from_slice(&rays.origin[i][start..end]);
+        part.dir[i].copy_from_slice(&rays.dir[i][start..end]);
+    }
+    part.near.copy_from_slice(&rays.near[start..end]);
+    part.far.copy_from_slice(&rays.far[start..end]);
+    let mut taken = Valid([0; N]);
+    taken.0.copy_from_slice(&valid.0[start..end]);
+    taken
 }

@@ -19,11 +19,14 @@ const CUT: f32 = 1e-4;
 
 /// A structure that is asked for packets.
 pub(crate) trait PacketTracer: Sync {
+    /// Working memory of a thread.
+    type Scratch: Default + Send;
+
     /// Closest hits: `far` and `hits.prim` of those rays that hit something.
-    fn closest(&self, valid: &Valid, packet: &mut Packet);
+    fn closest(&self, valid: &Valid, packet: &mut Packet, scratch: &mut Self::Scratch);
 
     /// Any hits: `far` becomes minus infinity.
-    fn occluded(&self, valid: &Valid, rays: &mut Rays);
+    fn occluded(&self, valid: &Valid, rays: &mut Rays, scratch: &mut Self::Scratch);
 }
 
 /// A structure with its name and what it took to build.
@@ -35,7 +38,8 @@ pub(crate) struct Peer<T> {
 
 /// Working memory of a thread: a tile of hits, packets for both kinds of rays.
 #[derive(Default)]
-struct Work {
+struct Work<S> {
+    scratch: S,
     prim: Vec<Lanes<u32>>,
     depth: Vec<Lanes<f32>>,
     lit: Vec<[u8; BLOCK_LANES]>,
@@ -44,12 +48,12 @@ struct Work {
 }
 
 /// What a peer has found in a tile.
-struct TileOfPeer<'w> {
+struct TileOfPeer<'w, S> {
     stride: u32,
-    work: &'w Work,
+    work: &'w Work<S>,
 }
 
-impl HitBlocks for TileOfPeer<'_> {
+impl<S> HitBlocks for TileOfPeer<'_, S> {
     const DEPTH: bool = true;
 
     #[inline]
@@ -104,40 +108,43 @@ impl<T: PacketTracer> Contender for Peer<T> {
 
     fn draw(&self, job: &Job, picture: &mut Picture) -> u64 {
         let (facets, rays) = (job.facets(), EyeRays::new(&job.view));
-        let tiles = picture.tiles_mut().map_init(Work::default, |work, out| {
-            let count = out.blocks.len();
-            work.prim.resize(count, [NOTHING; LANES]);
-            work.depth.resize(count, [0.0; LANES]);
-            work.lit.resize(count, [0; LANES]);
-            let mut asked = 0;
-            for block in 0..count {
-                let (bx, by) = (block as u32 % out.stride, block as u32 / out.stride);
-                let corner = [out.corner[0] + bx * 4, out.corner[1] + by * 4];
-                rays.aim(corner, &mut work.eye);
-                self.tracer.closest(&Valid([-1; LANES]), &mut work.eye);
-                work.prim[block] = work.eye.hits.prim;
-                work.depth[block] = work.eye.rays.far;
-                asked += match job.kind {
-                    FrameKind::Eye => 0,
-                    FrameKind::EyeHard => self.ask(job.light, &facets, block, work),
-                    FrameKind::EyeSoft => self.ask_area(job, &facets, corner, block, work),
+        let tiles = picture
+            .tiles_mut()
+            .map_init(Work::<T::Scratch>::default, |work, out| {
+                let count = out.blocks.len();
+                work.prim.resize(count, [NOTHING; LANES]);
+                work.depth.resize(count, [0.0; LANES]);
+                work.lit.resize(count, [0; LANES]);
+                let mut asked = 0;
+                for block in 0..count {
+                    let (bx, by) = (block as u32 % out.stride, block as u32 / out.stride);
+                    let corner = [out.corner[0] + bx * 4, out.corner[1] + by * 4];
+                    rays.aim(corner, &mut work.eye);
+                    self.tracer
+                        .closest(&Valid([-1; LANES]), &mut work.eye, &mut work.scratch);
+                    work.prim[block] = work.eye.hits.prim;
+                    work.depth[block] = work.eye.rays.far;
+                    asked += match job.kind {
+                        FrameKind::Eye => 0,
+                        FrameKind::EyeHard => self.ask(job.light, &facets, block, work),
+                        FrameKind::EyeSoft => self.ask_area(job, &facets, corner, block, work),
+                    };
+                }
+                let hits = TileOfPeer {
+                    stride: out.stride,
+                    work,
                 };
-            }
-            let hits = TileOfPeer {
-                stride: out.stride,
-                work,
-            };
-            facets.shade(&hits, out.corner, out.stride, out.blocks);
-            let samples = match job.kind {
-                FrameKind::Eye => return asked,
-                FrameKind::EyeHard => 1,
-                FrameKind::EyeSoft => SOFT_SAMPLES as u8,
-            };
-            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
-                darken(block, lit, samples);
-            }
-            asked
-        });
+                facets.shade(&hits, out.corner, out.stride, out.blocks);
+                let samples = match job.kind {
+                    FrameKind::Eye => return asked,
+                    FrameKind::EyeHard => 1,
+                    FrameKind::EyeSoft => SOFT_SAMPLES as u8,
+                };
+                for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
+                    darken(block, lit, samples);
+                }
+                asked
+            });
         tiles.sum()
     }
 }
@@ -145,7 +152,7 @@ impl<T: PacketTracer> Contender for Peer<T> {
 impl<T: PacketTracer> Peer<T> {
     /// One shadow ray from every hit of a block that is turned towards the light.
     #[inline]
-    fn ask(&self, light: Light, facets: &Facets, block: usize, work: &mut Work) -> u64 {
+    fn ask(&self, light: Light, facets: &Facets, block: usize, work: &mut Work<T::Scratch>) -> u64 {
         work.lit[block] = [0; LANES];
         let Some((valid, depth)) = turned_to_light(&work.eye, facets) else {
             return 0;
@@ -160,14 +167,21 @@ impl<T: PacketTracer> Peer<T> {
                 shadow.far = [f32::INFINITY; LANES];
             }
         }
-        self.tracer.occluded(&valid, shadow);
+        self.tracer.occluded(&valid, shadow, &mut work.scratch);
         work.lit[block] = std::array::from_fn(|l| open(&valid, shadow, l));
         valid.count()
     }
 
     /// Shadow rays to the points of the area light, sixteen pixels at a time.
     #[inline]
-    fn ask_area(&self, job: &Job, facets: &Facets, corner: [u32; 2], block: usize, work: &mut Work) -> u64 {
+    fn ask_area(
+        &self,
+        job: &Job,
+        facets: &Facets,
+        corner: [u32; 2],
+        block: usize,
+        work: &mut Work<T::Scratch>,
+    ) -> u64 {
         work.lit[block] = [0; LANES];
         let Some((mut valid, depth)) = turned_to_light(&work.eye, facets) else {
             return 0;
@@ -189,7 +203,7 @@ impl<T: PacketTracer> Peer<T> {
         let [x, y] = corner.map(|v| v % PATTERN / 4);
         for ends in &job.points[(y * (PATTERN / 4) + x) as usize] {
             aim_at(shadow, ends);
-            self.tracer.occluded(&valid, shadow);
+            self.tracer.occluded(&valid, shadow, &mut work.scratch);
             for (l, lit) in work.lit[block].iter_mut().enumerate() {
                 *lit += open(&valid, shadow, l);
             }

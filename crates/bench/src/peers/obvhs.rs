@@ -84,7 +84,9 @@ impl Obvhs {
 }
 
 impl PacketTracer for Obvhs {
-    fn closest(&self, valid: &Valid, packet: &mut Packet) {
+    type Scratch = ();
+
+    fn closest(&self, valid: &Valid, packet: &mut Packet, (): &mut ()) {
         for lane in (0..LANES).filter(|&lane| valid.0[lane] != 0) {
             let ray = Self::ray(&packet.rays, lane);
             let mut hit = RayHit::none();
@@ -100,7 +102,7 @@ impl PacketTracer for Obvhs {
         }
     }
 
-    fn occluded(&self, valid: &Valid, rays: &mut Rays) {
+    fn occluded(&self, valid: &Valid, rays: &mut Rays, (): &mut ()) {
         for lane in (0..LANES).filter(|&lane| valid.0[lane] != 0) {
             let ray = Self::ray(rays, lane);
             let test = |ray: &Ray, i: usize| self.triangles[i].intersect(ray);
