@@ -22,6 +22,10 @@ impl<'a> BruteForce<'a> {
         Self { triangles }
     }
 
+    pub(crate) fn triangles(&self) -> &Triangles<'a> {
+        &self.triangles
+    }
+
     /// All hits in the ray's range by ascending id, with their triangle ids.
     pub fn hits(&self, ray: &Ray) -> impl Iterator<Item = (u32, ExactHit)> + '_ {
         let ray = *ray;

@@ -46,6 +46,7 @@ mod receiver_grid;
 mod samples;
 pub mod solids;
 pub mod space;
+mod surface_ray;
 #[cfg(test)]
 mod test_meshes;
 pub mod topology;
@@ -76,6 +77,7 @@ pub use queries::Candidates;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use receiver_grid::{LightQuery, LitCounts, LitPixels};
 pub use samples::{MAX_SAMPLES, Samples};
+pub use surface_ray::SurfaceRay;
 pub use topology::Topology;
 pub use triangles::Triangles;
 pub use view::{View, ViewRay};

@@ -118,6 +118,14 @@ impl View {
         }
     }
 
+    /// The same view whose rays pass this far, in raster units, to the right and below of where they did.
+    pub fn shifted(&self, [x, y]: [f64; 2]) -> Self {
+        Self {
+            middle: [self.middle[0] - x, self.middle[1] - y],
+            ..*self
+        }
+    }
+
     /// Bound on the f64 error of a raster coordinate of a point within the raster, or of the ray through it, in
     /// raster units. Below 1e-9 but for extremely narrow or far views.
     pub fn rounding(&self) -> f64 {

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rayward_trace::ldc::{DepthFormat, Hierarchy};
 use rayward_trace::{
     Accel, BruteForce, Bvh, Candidates, Counters, FaceOptions, Grid3, Hit, Ldc, LdcOptions, Light,
-    PerspectiveGrids, Ray, Receiver, Topology, Triangles,
+    PerspectiveGrids, Ray, Receiver, SurfaceRay, Topology, Triangles,
 };
 use support::meshes::{self, Mesh};
 use support::{Random, rays};
@@ -213,6 +213,33 @@ fn all_structures_cast_the_same_shadows() {
                 for (name, structure) in &structures {
                     let place = || format!("{name} on {}, seed {seed}: {receiver:?} {light:?}", mesh.name);
                     assert_eq!(structure.shadowed(receiver, light), truth, "{}", place());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn rays_that_leave_a_surface_meet_the_same_triangle() {
+    for (k, mesh) in meshes::table().iter().enumerate() {
+        let seed = 900 + k as u64;
+        let brute = BruteForce::new(mesh.triangles());
+        let bvh = Bvh::build(mesh.triangles());
+        let mut random = Random::new(seed);
+        for mut from in receivers(mesh, seed, 400) {
+            let directions = [
+                random.direction(),
+                Vec3::AXES[random.below(3)],
+                random.direction() * 1e-20,
+                Vec3::ZERO,
+                Vec3::new(f32::NAN, 1.0, 0.0),
+            ];
+            for error in [from.error, -1.0] {
+                from.error = error;
+                for dir in directions {
+                    let ray = SurfaceRay { from, dir };
+                    let found = bvh.after(&ray, &mut ());
+                    assert_eq!(found, brute.after(&ray), "{}, seed {seed}: {ray:?}", mesh.name);
                 }
             }
         }

@@ -15,6 +15,7 @@
 mod build;
 mod node;
 mod slab;
+mod surface;
 
 use std::ops::ControlFlow;
 
