@@ -12,26 +12,30 @@ use glam::{DVec3, Vec3};
 use crate::Triangles;
 
 /// Texels of a tile's side; texels are stored tile by tile.
-pub(crate) const TILE: u32 = 8;
+pub const TILE: u32 = 8;
 
 /// Space to texel coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct CubeFrame {
+pub struct CubeFrame {
     /// Corner of the cube in space.
-    pub(crate) corner: DVec3,
+    pub corner: DVec3,
     /// Side of a texel in space.
-    pub(crate) side: f64,
+    pub side: f64,
     /// Texels along each axis, whole tiles.
-    pub(crate) size: [u32; 3],
+    pub size: [u32; 3],
 }
 
 /// A line in texel coordinates. `t` is that of the ray in space.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TexelRay {
-    pub(crate) origin: DVec3,
-    pub(crate) dir: DVec3,
-    pub(crate) t_min: f64,
-    pub(crate) t_max: f64,
+pub struct TexelRay {
+    /// Where `t` is 0.
+    pub origin: DVec3,
+    /// Direction; its length is that of the ray in space, in texels.
+    pub dir: DVec3,
+    /// Where the line enters the cube or starts.
+    pub t_min: f64,
+    /// Where it leaves the cube or ends.
+    pub t_max: f64,
 }
 
 /// Origins farther away, in texels, leave a line known to no better than a fraction of a texel.
@@ -39,7 +43,7 @@ const FARTHEST: f64 = (1u64 << 36) as f64;
 
 /// What a traversal can do with a ray.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Clipped {
+pub enum Clipped {
     /// It does not meet the cube within its range.
     Misses,
     /// The part within the cube.
@@ -50,7 +54,7 @@ pub(crate) enum Clipped {
 
 impl CubeFrame {
     /// The frame around all triangles that take part, `resolution` texels along the longest side of their box.
-    pub(crate) fn around(triangles: &Triangles, prims: &[u32], resolution: u32) -> Self {
+    pub fn around(triangles: &Triangles, prims: &[u32], resolution: u32) -> Self {
         let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
         let (low, high) = prims.iter().fold(nothing, |(low, high), &prim| {
             let [a, b, c] = triangles.corners(prim);
@@ -78,12 +82,12 @@ impl CubeFrame {
     }
 
     /// A point in texel coordinates.
-    pub(crate) fn texel(&self, point: DVec3) -> DVec3 {
+    pub fn texel(&self, point: DVec3) -> DVec3 {
         (point - self.corner) / self.side
     }
 
     /// The part of a ray within the cube. The range is widened by 2^-20 of its ends, beyond the error of any `t`.
-    pub(crate) fn clip(&self, origin: DVec3, dir: DVec3, t_min: f64, t_max: f64) -> Clipped {
+    pub fn clip(&self, origin: DVec3, dir: DVec3, t_min: f64, t_max: f64) -> Clipped {
         let (origin, dir) = (self.texel(origin), dir / self.side);
         let certain = origin.abs().max_element() < FARTHEST && dir.is_finite() && dir != DVec3::ZERO;
         if !certain {

@@ -31,17 +31,18 @@ use std::ops::ControlFlow;
 
 use glam::DVec3;
 
+pub use frame::{Clipped, CubeFrame, TILE, TexelRay};
 pub use levels::Hierarchy;
 pub use raster::Coverage;
 pub use sampled::HitTest;
-pub use samples::DepthFormat;
+pub use samples::{DepthFormat, TexelSample};
 pub use walk::{StepCounts, Steps};
 
 use crate::brute::{hit_in_range, rounded, write_sorted};
 use crate::exact::{self, ExactHit, Filter};
 use crate::{Accel, BuildStats, Hit, Light, Ray, Receiver, Triangles};
 use build::Stack;
-use frame::{Clipped, CubeFrame, TexelRay, widened};
+use frame::widened;
 use raster::{NO_PLANE, REACH};
 use samples::{Depth, Sample, Samples};
 use walk::walk;
@@ -176,6 +177,21 @@ impl<'a> Ldc<'a> {
     /// Texels along each axis, margins included.
     pub fn size(&self) -> [u32; 3] {
         self.frame.size
+    }
+
+    /// Where the cube lies.
+    pub fn frame(&self) -> CubeFrame {
+        self.frame
+    }
+
+    /// All samples of one direction, by texel in memory order, then by depth.
+    pub fn texel_samples(&self, axis: usize) -> Vec<TexelSample> {
+        let stack = &self.stacks[axis];
+        match &stack.samples {
+            Samples::F16(s) => samples::listed(stack, s),
+            Samples::U16(s) => samples::listed(stack, s),
+            Samples::F32(s) => samples::listed(stack, s),
+        }
     }
 
     /// Samples of each direction.

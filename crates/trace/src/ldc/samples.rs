@@ -6,7 +6,8 @@
 
 use half::f16;
 
-use super::raster::Fragment;
+use super::build::Stack;
+use super::raster::{Fragment, NO_PLANE};
 
 /// How depth is stored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -85,6 +86,37 @@ impl<D: Depth> Sample<D> {
             slopes: fragment.slopes,
         }
     }
+}
+
+/// A sample and where it is, for looking at a cube and for comparing cubes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TexelSample {
+    /// Index of the texel in memory order: tiles of 8 x 8 in rows, texels of a tile in rows.
+    pub texel: u32,
+    /// Triangle id.
+    pub prim: u32,
+    /// Depth at the texel's centre, in texels.
+    pub depth: f32,
+    /// Slopes of depth, 127 for 1; none if the sample has no plane.
+    pub slopes: Option<[i8; 2]>,
+}
+
+/// The samples of a direction with their texels.
+pub(crate) fn listed<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<TexelSample> {
+    let mut all = Vec::with_capacity(samples.len());
+    for (texel, range) in stack.starts.windows(2).enumerate() {
+        all.extend(
+            samples[range[0] as usize..range[1] as usize]
+                .iter()
+                .map(|sample| TexelSample {
+                    texel: texel as u32,
+                    prim: sample.prim,
+                    depth: sample.depth.texels(stack.scale),
+                    slopes: (sample.slopes != NO_PLANE).then_some(sample.slopes),
+                }),
+        );
+    }
+    all
 }
 
 /// All samples of one direction.

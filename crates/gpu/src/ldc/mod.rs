@@ -1,0 +1,144 @@
+//! [`Cube`]: the layered depth cube in a GPU's memory; `trace::ldc` in WGSL.
+//!
+//! VMV07 routes triangles in a geometry shader, which WebGPU has not, and peels, which takes as many passes as there
+//! are layers. Here everything is compute: a thread per row of a triangle works out the routing again (some fifty
+//! operations), texels count their samples, a prefix sum gives each its place, a second sweep fills them in, and each
+//! texel sorts its few by depth and id, so that the order of threads leaves no trace. Peeling is there for comparison
+//! (`CubeOptions::build`).
+//!
+//! Layout: 4 bytes a texel, 12 a sample (id, depth, slopes), 16 a cell, 12 a triangle and 12 a vertex. The samples'
+//! 128 MiB binding allows 11 million of them; a scene that would have more gets a cube of half the resolution, a
+//! quarter and so on. Cost: a sweep costs what its samples do; a ray some hundred steps. Limits: resolution up to
+//! 2048, where f32 texel coordinates still resolve 1/8192 of a texel.
+
+mod build;
+pub(crate) mod layout;
+pub(crate) mod shaders;
+#[cfg(test)]
+mod tests;
+mod trace;
+
+use rayward_trace::ldc::{Coverage, CubeFrame, Hierarchy, LdcBuild, StepCounts, TexelSample};
+use rayward_trace::{BuildStats, Triangles};
+use wgpu::Buffer;
+
+use crate::{Gpu, Result};
+
+/// Parameters of a cube.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CubeOptions {
+    /// Texels along the longest side of the scene's box, 16 to 2048.
+    pub resolution: u32,
+    /// How samples are made.
+    pub build: LdcBuild,
+    /// What lies above the texels.
+    pub hierarchy: Hierarchy,
+    /// The resolution is halved until there are no more samples than this, nor than fit a binding.
+    pub max_samples: u64,
+}
+
+impl Default for CubeOptions {
+    fn default() -> Self {
+        Self {
+            resolution: 512,
+            build: LdcBuild::Csr(Coverage::Conservative),
+            hierarchy: Hierarchy::Pyramid,
+            max_samples: 1 << 26,
+        }
+    }
+}
+
+/// A layered depth cube over the triangles of one frame, in a GPU's memory.
+#[derive(Debug)]
+pub struct Cube<'a> {
+    gpu: &'a Gpu,
+    triangles: Triangles<'a>,
+    frame: CubeFrame,
+    layout: layout::Frame,
+    stats: BuildStats,
+    /// Samples of all directions, those that equal depths have left over included.
+    samples: u64,
+    layers: u32,
+    /// Whether its samples name every triangle over a texel.
+    complete: bool,
+    buffers: Buffers,
+}
+
+#[derive(Debug)]
+struct Buffers {
+    frame: Buffer,
+    positions: Buffer,
+    indices: Buffer,
+    starts: Buffer,
+    samples: Buffer,
+    cells: Buffer,
+}
+
+/// What tracing a batch of rays took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TraceStats {
+    /// Rays traced.
+    pub rays: usize,
+    /// Rays whose answer f32 could not tell, which were answered on the CPU.
+    pub unsure: usize,
+    /// Steps of all rays on the GPU.
+    pub steps: StepCounts,
+}
+
+impl Cube<'_> {
+    /// What was built and what was left out.
+    pub fn stats(&self) -> BuildStats {
+        self.stats
+    }
+
+    /// Where the cube lies.
+    pub fn frame(&self) -> CubeFrame {
+        self.frame
+    }
+
+    /// Samples of all directions.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Samples in the fullest texel: VMV07's number of peeling passes.
+    pub fn layers(&self) -> u32 {
+        self.layers
+    }
+
+    /// Memory of the cube on the device in bytes, triangles included.
+    pub fn bytes(&self) -> u64 {
+        let b = &self.buffers;
+        [
+            &b.frame,
+            &b.positions,
+            &b.indices,
+            &b.starts,
+            &b.samples,
+            &b.cells,
+        ]
+        .map(Buffer::size)
+        .iter()
+        .sum()
+    }
+
+    /// All samples of one direction, by texel in memory order, then by depth.
+    pub fn texel_samples(&self, axis: usize) -> Result<Vec<TexelSample>> {
+        let [first, end] = [0, 1].map(|i| u64::from(self.layout.first_texel[axis + i]));
+        let starts: Vec<u32> = self.gpu.read(&self.buffers.starts, first, end - first + 1)?;
+        let (from, to) = (u64::from(starts[0]), u64::from(starts[starts.len() - 1]));
+        let samples: Vec<[u32; 3]> = self.gpu.read(&self.buffers.samples, from, to - from)?;
+        let mut all = Vec::with_capacity(samples.len());
+        for (texel, range) in starts.windows(2).enumerate() {
+            let [a, b] = [range[0] - starts[0], range[1] - starts[0]].map(|i| i as usize);
+            let kept = samples[a..b].iter().filter(|s| s[0] != u32::MAX);
+            all.extend(kept.map(|&[prim, depth, slopes]| TexelSample {
+                texel: texel as u32,
+                prim,
+                depth: f32::from_bits(depth),
+                slopes: (slopes != 0x8080).then_some([slopes as u8 as i8, (slopes >> 8) as u8 as i8]),
+            }));
+        }
+        Ok(all)
+    }
+}

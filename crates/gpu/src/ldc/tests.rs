@@ -1,0 +1,508 @@
+//! The cube on a device beside `trace::ldc`, and exact answers beside brute force.
+//!
+//! Without an adapter the tests of this file say so and pass; with CI=true they fail.
+
+use std::collections::BTreeSet;
+
+use glam::{DVec3, Vec3};
+use rayward_trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, TexelSample};
+use rayward_trace::{Accel, BruteForce, Hit, Ldc, LdcOptions, Light, Ray, Receiver, Triangles};
+
+use super::{Cube, CubeOptions};
+use crate::{Error, Gpu};
+
+const CENTRE: LdcBuild = LdcBuild::Csr(Coverage::Centre);
+const CONSERVATIVE: LdcBuild = LdcBuild::Csr(Coverage::Conservative);
+
+fn gpu() -> Option<Gpu> {
+    match Gpu::open(None) {
+        Ok(gpu) => Some(gpu),
+        Err(problem @ Error::NoAdapter { .. }) if std::env::var("CI").as_deref() != Ok("true") => {
+            eprintln!("SKIPPED: {problem}");
+            None
+        }
+        Err(problem) => panic!("{problem}"),
+    }
+}
+
+/// Deterministic numbers in [-1, 1).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        ((self.0 >> 40) as f32) / (1u64 << 23) as f32 - 1.0
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+#[derive(Default)]
+struct Mesh {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+    indices: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    fn vertex(&mut self, p: Vec3) -> u32 {
+        self.x.push(p.x);
+        self.y.push(p.y);
+        self.z.push(p.z);
+        self.x.len() as u32 - 1
+    }
+
+    fn triangle(&mut self, corners: [Vec3; 3]) {
+        let indices = corners.map(|p| self.vertex(p));
+        self.indices.push(indices);
+    }
+
+    fn triangles(&self) -> Triangles<'_> {
+        Triangles::new(&self.x, &self.y, &self.z, &self.indices)
+    }
+
+    fn soup(seed: u64, count: usize, size: f32) -> Self {
+        let mut numbers = Numbers(seed);
+        let mut mesh = Self::default();
+        for _ in 0..count {
+            let center = numbers.point();
+            mesh.triangle([(); 3].map(|()| center + numbers.point() * size));
+        }
+        mesh
+    }
+
+    /// A lumpy sphere.
+    fn lump(rings: u32) -> Self {
+        let mut mesh = Self::default();
+        let at = |i: u32, j: u32| {
+            let (theta, phi) = (
+                std::f32::consts::PI * i as f32 / rings as f32,
+                std::f32::consts::TAU * (j % (2 * rings)) as f32 / (2 * rings) as f32,
+            );
+            let d = Vec3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+            d * (1.0 + 0.3 * (5.0 * d.x).sin() * (4.0 * d.y).cos())
+        };
+        for (i, j) in (0..rings).flat_map(|i| (0..2 * rings).map(move |j| (i, j))) {
+            mesh.triangle([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            mesh.triangle([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        mesh
+    }
+
+    /// What is hard: slivers, huge and tiny triangles, the same ones twice, coplanar overlaps, a grid seen along its
+    /// planes, triangles that are broken, all of it a little off.
+    fn awkward() -> Self {
+        let mut mesh = Self::soup(5, 40, 0.2);
+        let mut numbers = Numbers(17);
+        for _ in 0..40 {
+            let (from, along) = (numbers.point(), numbers.point());
+            let thin = numbers.point() * 10f32.powf(-3.5 + 2.5 * numbers.next());
+            mesh.triangle([from, from + along, from + along * 0.5 + thin]);
+        }
+        for _ in 0..40 {
+            let center = numbers.point();
+            mesh.triangle([(); 3].map(|()| center + numbers.point() * 1e-3));
+        }
+        for i in 0..8 {
+            let z = i as f32 * 0.25 - 1.0;
+            let [a, b, c] = [
+                Vec3::new(-1.0, -1.0, z),
+                Vec3::new(1.0, -1.0, z),
+                Vec3::new(0.0, 1.0, z),
+            ];
+            mesh.triangle([a, b, c]);
+            if i % 2 == 0 {
+                mesh.triangle([a * 0.5, b * 0.5, c * 0.5].map(|p| Vec3::new(p.x, p.y, z)));
+                mesh.triangle([b, c, a]);
+            }
+        }
+        mesh.triangle([
+            Vec3::splat(-1.3),
+            Vec3::new(1.3, -1.2, -1.3),
+            Vec3::new(0.1, 0.2, 1.4),
+        ]);
+        mesh.triangle([Vec3::ZERO, Vec3::ONE, Vec3::ONE]);
+        mesh.triangle([Vec3::ZERO, Vec3::new(f32::NAN, 0.0, 0.0), Vec3::X]);
+        for i in 0..mesh.x.len() {
+            mesh.x[i] += 0.1;
+        }
+        mesh
+    }
+}
+
+fn meshes() -> [Mesh; 3] {
+    [Mesh::soup(1, 300, 0.3), Mesh::lump(24), Mesh::awkward()]
+}
+
+fn options(build: LdcBuild) -> CubeOptions {
+    CubeOptions {
+        resolution: 72,
+        build,
+        ..CubeOptions::default()
+    }
+}
+
+fn reference(options: &CubeOptions) -> LdcOptions {
+    LdcOptions {
+        resolution: options.resolution,
+        build: options.build,
+        depth: DepthFormat::F32,
+        hierarchy: options.hierarchy,
+        max_samples: u64::MAX,
+    }
+}
+
+/// Rays through the middle of things, a third of them along axes or in planes of two.
+fn rays(seed: u64, count: usize) -> Vec<Ray> {
+    let mut numbers = Numbers(seed);
+    (0..count)
+        .map(|i| {
+            let (from, mut dir) = (numbers.point() * 1.5, numbers.point());
+            match i % 9 {
+                0 => dir = Vec3::AXES[i / 9 % 3] * dir.x.signum(),
+                1 | 2 => dir[i / 9 % 3] = 0.0,
+                _ => {}
+            }
+            Ray::new(from, dir)
+        })
+        .collect()
+}
+
+fn built<'a>(gpu: &'a Gpu, mesh: &'a Mesh, options: &CubeOptions) -> Cube<'a> {
+    Cube::build(gpu, mesh.triangles(), options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn samples(cube: &Cube, axis: usize) -> Vec<TexelSample> {
+    cube.texel_samples(axis).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn sweeping_and_peeling_make_the_same_samples() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in meshes() {
+        let [swept, peeled] = [CENTRE, LdcBuild::Peel].map(|build| built(&gpu, &mesh, &options(build)));
+        assert_eq!(swept.layers(), peeled.layers());
+        for axis in 0..3 {
+            let (a, b) = (samples(&swept, axis), samples(&peeled, axis));
+            assert!(a.len() > 100);
+            assert_eq!(a, b, "axis {axis}");
+        }
+    }
+}
+
+/// The lump in whole 1/256ths of a texel of a cube of this resolution, so that f32 rounds nothing.
+fn on_lattice(resolution: u32) -> Mesh {
+    let mut mesh = Mesh::lump(20);
+    let size = (resolution - 2) as f32;
+    let least = [&mesh.x, &mesh.y, &mesh.z].map(|v| v.iter().copied().fold(f32::INFINITY, f32::min));
+    let extent = [&mesh.x, &mesh.y, &mesh.z]
+        .iter()
+        .zip(least)
+        .map(|(v, low)| v.iter().copied().fold(0.0, |m: f32, x| m.max(x - low)))
+        .fold(0.0, f32::max);
+    for (values, low) in [&mut mesh.x, &mut mesh.y, &mut mesh.z].into_iter().zip(least) {
+        for value in values.iter_mut() {
+            *value = ((*value - low) / extent * size * 256.0).round() / 256.0;
+        }
+    }
+    mesh
+}
+
+#[test]
+fn samples_are_those_of_the_reference() {
+    let Some(gpu) = gpu() else { return };
+    for build in [CENTRE, CONSERVATIVE] {
+        let (exact, rounded) = (on_lattice(72), Mesh::soup(1, 300, 0.3));
+        for (mesh, exact) in [(&exact, true), (&rounded, false)] {
+            let options = options(build);
+            let cube = built(&gpu, mesh, &options);
+            let ldc = Ldc::build(mesh.triangles(), &reference(&options));
+            assert_eq!(cube.frame(), ldc.frame());
+            for axis in 0..3 {
+                let (own, other) = (samples(&cube, axis), ldc.texel_samples(axis));
+                let places =
+                    |all: &[TexelSample]| all.iter().map(|s| (s.texel, s.prim)).collect::<BTreeSet<_>>();
+                let (a, b) = (places(&own), places(&other));
+                let different = a.symmetric_difference(&b).count();
+                let allowed = if exact { 0 } else { b.len() / 500 };
+                assert!(
+                    different <= allowed,
+                    "{build:?}, axis {axis}: {different} of {}",
+                    b.len()
+                );
+                let depths: std::collections::BTreeMap<_, _> =
+                    other.iter().map(|s| ((s.texel, s.prim), s)).collect();
+                for sample in &own {
+                    let Some(same) = depths.get(&(sample.texel, sample.prim)) else {
+                        continue;
+                    };
+                    let near = (sample.depth - same.depth).abs() < 0.01;
+                    assert!(near || sample.slopes.is_none(), "{sample:?} {same:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn exact_answers_are_those_of_brute_force() {
+    let Some(gpu) = gpu() else { return };
+    for (mesh, resolution) in meshes().iter().zip([72, 256, 200]) {
+        let brute = BruteForce::new(mesh.triangles());
+        for hierarchy in [
+            Hierarchy::Pyramid,
+            Hierarchy::Flat,
+            Hierarchy::Tiles { log2: [2, 4] },
+        ] {
+            let options = CubeOptions {
+                resolution,
+                hierarchy,
+                ..CubeOptions::default()
+            };
+            let cube = built(&gpu, mesh, &options);
+            let rays = rays(11, 3000);
+            let (hits, stats) = cube.closest(&rays, &brute).unwrap_or_else(|e| panic!("{e}"));
+            let mut count = 0;
+            for (ray, hit) in rays.iter().zip(&hits) {
+                assert_eq!(*hit, brute.intersect(ray), "{ray:?}");
+                count += usize::from(hit.is_some());
+            }
+            assert!(count > 300, "{count}");
+            assert!(stats.unsure < rays.len() / 3, "{stats:?}");
+        }
+    }
+}
+
+#[test]
+fn what_the_device_calls_certain_is_certain() {
+    let Some(gpu) = gpu() else { return };
+    // An accel that knows nothing: every answer that is left is the device's own.
+    struct Silent;
+    impl Accel for Silent {
+        fn intersect(&self, _: &Ray) -> Option<Hit> {
+            None
+        }
+        fn all_hits(&self, _: &Ray, hits: &mut Vec<Hit>) {
+            hits.clear();
+        }
+        fn shadowed(&self, _: &Receiver, _: &Light) -> bool {
+            false
+        }
+    }
+    let mesh = Mesh::lump(60);
+    let brute = BruteForce::new(mesh.triangles());
+    let cube = built(&gpu, &mesh, &CubeOptions::default());
+    let rays = rays(3, 2000);
+    let (hits, stats) = cube.closest(&rays, &Silent).unwrap_or_else(|e| panic!("{e}"));
+    let missed = rays
+        .iter()
+        .zip(&hits)
+        .filter(|(ray, hit)| {
+            let truth = brute.intersect(ray);
+            assert!(hit.is_none() || **hit == truth, "{ray:?} {hit:?} {truth:?}");
+            **hit != truth
+        })
+        .count();
+    assert!(missed <= stats.unsure, "{missed} {stats:?}");
+    assert!(stats.unsure < rays.len() / 50, "{stats:?}");
+    let not_exact = built(&gpu, &mesh, &options(CENTRE));
+    let (_, stats) = not_exact.closest(&rays, &brute).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(stats.unsure, rays.len());
+}
+
+#[test]
+fn shadows_are_those_of_brute_force() {
+    let Some(gpu) = gpu() else { return };
+    for mesh in meshes() {
+        let brute = BruteForce::new(mesh.triangles());
+        let cube = built(&gpu, &mesh, &CubeOptions::default());
+        let mut queries = Vec::new();
+        for ray in rays(7, 1500) {
+            let Some((prim, hit)) = brute.closest(&ray) else {
+                continue;
+            };
+            let receiver = Receiver::on_surface(&ray, hit.t, prim);
+            queries.push((receiver, Light::Point(Vec3::new(1.6, 0.3, 1.2))));
+            queries.push((receiver, Light::Directional(Vec3::new(0.2, 0.5, 1.0))));
+            queries.push((
+                Receiver::free(ray.origin.as_dvec3()),
+                Light::Point(Vec3::new(0.1, 0.2, 0.3)),
+            ));
+        }
+        let (dark, stats) = cube.shadowed(&queries, &brute).unwrap_or_else(|e| panic!("{e}"));
+        for ((receiver, light), dark) in queries.iter().zip(&dark) {
+            assert_eq!(*dark, brute.shadowed(receiver, light), "{receiver:?} {light:?}");
+        }
+        let count = dark.iter().filter(|d| **d).count();
+        assert!(
+            count > 100 && count < queries.len() - 100,
+            "{count} of {}",
+            queries.len()
+        );
+        assert!(stats.unsure < queries.len() / 3, "{stats:?}");
+    }
+}
+
+#[test]
+fn hits_of_samples_are_those_of_the_reference() {
+    let Some(gpu) = gpu() else { return };
+    let tests = [
+        HitTest::Strict { tolerance: 1.0 },
+        HitTest::Interval { tolerance: 0.5 },
+        HitTest::Plane { margin: 0.25 },
+    ];
+    let mesh = Mesh::lump(40);
+    for build in [CENTRE, CONSERVATIVE] {
+        let options = CubeOptions {
+            resolution: 128,
+            build,
+            ..CubeOptions::default()
+        };
+        let cube = built(&gpu, &mesh, &options);
+        let ldc = Ldc::build(mesh.triangles(), &reference(&options));
+        let rays = rays(5, 3000);
+        for test in tests {
+            let (hits, _) = cube
+                .closest_sampled(&rays, test)
+                .unwrap_or_else(|e| panic!("{e}"));
+            let (mut different, mut count) = (0, 0);
+            for (ray, hit) in rays.iter().zip(&hits) {
+                let other = ldc.closest_sampled(ray, test, &mut ());
+                count += usize::from(other.is_some());
+                let same = match (hit, &other) {
+                    (None, None) => true,
+                    (Some(a), Some(b)) => {
+                        a.prim == b.prim
+                            && f64::from((a.t - b.t).abs() * ray.dir.length()) < 0.01 * ldc.texel_size()
+                    }
+                    _ => false,
+                };
+                different += usize::from(!same);
+            }
+            assert!(count > 300, "{count}");
+            assert!(
+                different * 200 <= count,
+                "{build:?} {test:?}: {different} of {count}"
+            );
+        }
+    }
+}
+
+#[test]
+fn levels_save_steps_and_change_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = Mesh::lump(40);
+    let rays = rays(9, 1000);
+    let test = HitTest::Plane { margin: 0.25 };
+    let [flat, tiles, pyramid] = [
+        Hierarchy::Flat,
+        Hierarchy::Tiles { log2: [3; 2] },
+        Hierarchy::Pyramid,
+    ]
+    .map(|hierarchy| {
+        let options = CubeOptions {
+            resolution: 256,
+            build: CENTRE,
+            hierarchy,
+            ..CubeOptions::default()
+        };
+        let cube = built(&gpu, &mesh, &options);
+        cube.closest_sampled(&rays, test)
+            .unwrap_or_else(|e| panic!("{e}"))
+    });
+    assert_eq!(flat.0, tiles.0);
+    assert_eq!(flat.0, pyramid.0);
+    let [flat, tiles, pyramid] = [flat, tiles, pyramid].map(|(_, stats)| stats.steps);
+    assert_eq!(flat.cells, 0);
+    assert!(tiles.texels * 3 < flat.texels, "{tiles:?} {flat:?}");
+    assert!(
+        pyramid.cells + pyramid.texels < tiles.cells + tiles.texels,
+        "{pyramid:?} {tiles:?}"
+    );
+}
+
+#[test]
+fn too_many_samples_make_a_smaller_cube() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = Mesh::soup(6, 400, 1.0);
+    let options = CubeOptions {
+        max_samples: 200_000,
+        ..CubeOptions::default()
+    };
+    let cube = built(&gpu, &mesh, &options);
+    assert!((20_000..200_000).contains(&cube.samples()), "{}", cube.samples());
+    let brute = BruteForce::new(mesh.triangles());
+    let rays = rays(7, 500);
+    let (hits, _) = cube.closest(&rays, &brute).unwrap_or_else(|e| panic!("{e}"));
+    for (ray, hit) in rays.iter().zip(&hits) {
+        assert_eq!(*hit, brute.intersect(ray));
+    }
+    let tiny = CubeOptions {
+        max_samples: 10,
+        ..options
+    };
+    let problem = Cube::build(&gpu, mesh.triangles(), &tiny).map(|_| ());
+    assert!(
+        matches!(problem, Err(Error::Limits { limit: 10, .. })),
+        "{problem:?}"
+    );
+}
+
+#[test]
+fn nothing_is_hit_in_an_empty_cube_and_odd_rays_hit_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let (empty, lump) = (Mesh::default(), Mesh::lump(8));
+    for build in [CENTRE, LdcBuild::Peel, CONSERVATIVE] {
+        let cube = built(&gpu, &empty, &options(build));
+        let ray = Ray::new(Vec3::ONE, Vec3::NEG_ONE);
+        let brute = BruteForce::new(empty.triangles());
+        let (hits, _) = cube.closest(&[ray], &brute).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(hits, [None]);
+    }
+    let cube = built(&gpu, &lump, &CubeOptions::default());
+    let brute = BruteForce::new(lump.triangles());
+    let odd = [
+        Ray::new(Vec3::NAN, Vec3::X),
+        Ray::new(Vec3::ONE, Vec3::ZERO),
+        Ray::new(Vec3::splat(1e30), Vec3::NEG_ONE),
+        Ray::new(Vec3::new(-1e6, 0.0, 0.0), Vec3::X * 1e-20),
+        Ray {
+            t_max: 1.0,
+            ..Ray::new(Vec3::X * -3.0, Vec3::X * 2.0)
+        },
+        Ray {
+            t_min: 2.0,
+            ..Ray::new(Vec3::X * -3.0, Vec3::X)
+        },
+        Ray {
+            t_min: f32::NEG_INFINITY,
+            ..Ray::new(Vec3::X * 9.0, Vec3::X)
+        },
+    ];
+    let (hits, _) = cube.closest(&odd, &brute).unwrap_or_else(|e| panic!("{e}"));
+    let truth: Vec<_> = odd.iter().map(|ray| brute.intersect(ray)).collect();
+    assert_eq!(hits, truth);
+    assert!(cube.closest(&[], &brute).is_ok_and(|(hits, _)| hits.is_empty()));
+    assert_eq!(DVec3::ZERO, cube.frame().texel(cube.frame().corner));
+}
+
+#[test]
+fn a_lost_device_is_one_error() {
+    let Some(gpu) = gpu() else { return };
+    let mesh = Mesh::lump(8);
+    let brute = BruteForce::new(mesh.triangles());
+    let cube = built(&gpu, &mesh, &options(CONSERVATIVE));
+    gpu.destroy();
+    let problem = cube.closest(&rays(1, 10), &brute).map(|_| ());
+    assert!(matches!(problem, Err(Error::Lost { .. })), "{problem:?}");
+    let text = problem.err().map(|e| e.to_string()).unwrap_or_default();
+    assert!(text.contains(&gpu.adapter().name), "{text}");
+    let unknown = Gpu::open(Some("no such adapter")).map(|_| ());
+    assert!(matches!(unknown, Err(Error::NoAdapter { .. })), "{unknown:?}");
+}
