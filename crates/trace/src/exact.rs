@@ -154,24 +154,46 @@ pub fn side(corners: [Vec3; 3], light: &Light) -> f64 {
 /// error bound left out.
 #[inline]
 pub fn shadows(triangles: &Triangles, prim: u32, receiver: &Receiver, light: &Light) -> bool {
-    prim != receiver.prim && blocks(triangles.corners(prim), receiver, light)
+    shadow_hit(triangles, prim, receiver, light).is_some()
 }
 
 /// [`shadows`] for a triangle with these corners, which is not the receiver's own.
 #[inline]
 pub fn blocks(corners: [Vec3; 3], receiver: &Receiver, light: &Light) -> bool {
+    between(corners, receiver, light).is_some()
+}
+
+/// As [`shadows`], with the hit along [`shadow_line`].
+#[inline]
+pub fn shadow_hit(triangles: &Triangles, prim: u32, receiver: &Receiver, light: &Light) -> Option<ExactHit> {
+    let own = prim == receiver.prim;
+    if own { None } else { between(triangles.corners(prim), receiver, light) }
+}
+
+#[inline]
+fn between(corners: [Vec3; 3], receiver: &Receiver, light: &Light) -> Option<ExactHit> {
+    let (origin, dir) = shadow_line(receiver, light);
+    let hit = hit(origin, dir, corners)?;
+    lies_between(&hit, dir, receiver, light).then_some(hit)
+}
+
+/// Origin and direction of the line on which a receiver and a light lie.
+#[inline]
+pub fn shadow_line(receiver: &Receiver, light: &Light) -> (DVec3, DVec3) {
     match *light {
-        Light::Point(position) => {
-            // From the light, so that all rays of one light see the same rounded corners.
-            let origin = position.as_dvec3();
-            let dir = receiver.point - origin;
-            hit(origin, dir, corners)
-                .is_some_and(|h| h.t > 0.0 && (1.0 - h.t) * dir.length() > receiver.error)
-        }
-        Light::Directional(direction) => {
-            let dir = direction.as_dvec3();
-            hit(receiver.point, dir, corners).is_some_and(|h| h.t * dir.length() > receiver.error)
-        }
+        // From the light, so that all rays of one light see the same rounded corners.
+        Light::Point(position) => (position.as_dvec3(), receiver.point - position.as_dvec3()),
+        Light::Directional(direction) => (receiver.point, direction.as_dvec3()),
+    }
+}
+
+/// Whether a hit along the [`shadow_line`] of direction `dir` lies between its ends, the receiver's error bound left
+/// out.
+#[inline]
+pub(crate) fn lies_between(hit: &ExactHit, dir: DVec3, receiver: &Receiver, light: &Light) -> bool {
+    match light {
+        Light::Point(_) => hit.t > 0.0 && (1.0 - hit.t) * dir.length() > receiver.error,
+        Light::Directional(_) => hit.t * dir.length() > receiver.error,
     }
 }
 

@@ -9,6 +9,8 @@
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | soft shadow rays of one light | [`AreaLightTree`] | HM08 §5.3, in a hierarchy |
 //! | any ray, at spheres, cylinders, capsules and what is made of them | [`solids::SolidGrids`] | HM08 §3 |
+//! | eye rays through masked and blended triangles | [`EyeVeils`] | HM08 §5.1 |
+//! | shadow rays through them | [`PointLightGrid::each_between`] | HM08 §5.2 |
 //! | any ray | [`Bvh`] | general hierarchy |
 //! | any ray | [`Grid3`] in world space | the regular grid of HM08, Table 5 |
 //! | any ray | [`Ldc`] | VMV07 |
@@ -33,6 +35,7 @@ mod eye_grid;
 mod faces;
 mod facets;
 mod grid3;
+mod eye_veils;
 mod kernel;
 pub mod ldc;
 mod light_grid;
@@ -65,6 +68,7 @@ pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use faces::FaceOptions;
 pub use facets::{BLOCK_LANES, Facets, HitBlocks, darken, darken_unlit};
 pub use grid3::{Grid3, RaySpan};
+pub use eye_veils::{EyeVeils, TileVeils, VeilHit};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
 pub use ldc::{Ldc, LdcOptions};

@@ -20,6 +20,8 @@
 //! for each chunk of triangles. Rebuilt every
 //! frame. Answers: exactly those of [`crate::BruteForce`], see [`crate::exact`].
 
+mod veils;
+
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -29,6 +31,7 @@ use crate::eye_grid::project_all;
 use crate::kernel::edges::{EdgeLanes, EdgeRecord, VertexLanes};
 use crate::kernel::points::{Caster, PointLanes, set_up_casters, shadowed};
 use crate::kernel::project::RasterVertex;
+use crate::kernel::veils::Veiled;
 use crate::kernel::{LANES, NEARNESS_BAND, SimdLevel};
 use crate::precise::PreciseTriangle;
 use crate::view::View;
@@ -118,6 +121,7 @@ pub struct ShadowScratch {
     pending: Vec<Pending>,
     unsure: Vec<(u32, u32)>,
     points: PointLanes,
+    veils: Vec<Veiled>,
     /// Totals of all queries made with this memory.
     pub counts: ShadowCounts,
 }
@@ -419,7 +423,7 @@ pub(crate) fn takes_part(light: &Light, triangles: &Triangles, casts: Casts, pri
 /// Set-ups done by one task.
 const CASTER_CHUNK: usize = 8 * 1024;
 
-fn set_up_all(
+pub(crate) fn set_up_all(
     level: SimdLevel,
     view: &View,
     triangles: &Triangles,

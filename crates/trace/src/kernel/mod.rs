@@ -21,6 +21,7 @@ pub(crate) mod project;
 pub(crate) mod receivers;
 pub(crate) mod shaft;
 pub(crate) mod tile;
+pub(crate) mod veils;
 
 use fearless_simd::{Level, Simd, f32x16, mask32x16, prelude::*};
 
