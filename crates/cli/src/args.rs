@@ -198,6 +198,9 @@ pub(crate) struct PictureArgs {
     /// Which sides of triangles cast shadows
     #[arg(long, value_name = "SIDES", default_value = "auto", conflicts_with = "paper")]
     pub(crate) casters: Casters,
+    /// Blended surfaces colour the light they let through, as stained glass does; they dim it otherwise
+    #[arg(long, conflicts_with = "no_shadows")]
+    pub(crate) tinted_shadows: bool,
     /// From linear colour to what is displayed, for PNG; `none`, or `exposure` where --exposure is given
     #[arg(long, value_name = "OPERATOR")]
     pub(crate) tone_map: Option<Operator>,

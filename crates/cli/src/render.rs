@@ -153,6 +153,7 @@ fn options(args: &PictureArgs) -> RenderOptions {
         casters: args.casters.into(),
         samples: args.samples,
         seed: args.seed,
+        tinted_shadows: args.tinted_shadows,
         ambient: args.ambient.unwrap_or(defaults.ambient),
         background: args.background.unwrap_or(defaults.background),
         pixel_samples: args.pixel_samples.unwrap_or(if spread { 16 } else { 1 }),

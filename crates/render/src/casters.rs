@@ -52,7 +52,7 @@ impl<'t> CasterRules<'t> {
         }
     }
 
-    /// Whether a triangle lets light through, so that grids leave it to the hierarchy.
+    /// Whether a triangle lets light through, so that it belongs into grids of its own.
     pub fn is_transparent(&self, prim: u32) -> bool {
         self.transparent.get(prim as usize).copied().unwrap_or(false)
     }
@@ -121,7 +121,7 @@ impl<'t> CasterRules<'t> {
 }
 
 /// Per triangle, whether its material is masked or blended; empty if none is.
-fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
+pub(crate) fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
     let transparent = |material: u32| scene.materials[material as usize].alpha_mode != AlphaMode::Opaque;
     if !geometry.objects.iter().any(|o| transparent(o.material)) {
         return Vec::new();

@@ -371,24 +371,23 @@ impl Frame<'_> {
     }
 
     /// Share of a light that reaches a receiver.
-    fn passed(&self, now: &MovingAt, receiver: &Receiver, light: &Light, work: &mut Work) -> f32 {
+    fn passed(&self, now: &MovingAt, receiver: &Receiver, light: &Light, work: &mut Work) -> Vec3 {
         if self.transparent.is_empty() {
-            return f32::from(u8::from(!now.shadows(receiver, light, &mut ())));
+            let lit = !now.shadows(receiver, light, &mut ());
+            return Vec3::splat(f32::from(u8::from(lit)));
         }
-        let (origin, dir) = match *light {
-            Light::Point(position) => (position.as_dvec3(), receiver.point - position.as_dvec3()),
-            Light::Directional(direction) => (receiver.point, direction.as_dvec3()),
-        };
+        let (origin, dir) = exact::shadow_line(receiver, light);
+        let tinted = self.options.tinted_shadows;
         now.blockers(receiver, light, &mut (), &mut work.blockers);
-        let mut passed = 1.0;
+        let mut passed = Vec3::ONE;
         for &prim in &work.blockers {
             let object = object_of(self.open, prim);
             if !self.transparent[self.open.objects[object as usize].material as usize] {
-                return 0.0;
+                return Vec3::ZERO;
             }
             if let Some(hit) = exact::attributes(origin, dir, now.corners(prim)) {
-                let (u, v) = (hit.u as f32, hit.v as f32);
-                passed *= 1.0 - self.shader.coverage(self.open, prim, object, u, v);
+                let place = [hit.u as f32, hit.v as f32];
+                passed *= self.shader.transmittance(self.open, prim, object, place, tinted);
             }
         }
         passed

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
 use rayward_trace::{Clusters, Topology};
 
-use crate::casters::CasterRules;
+use crate::casters::{CasterRules, transparent_triangles};
 use crate::distributed::{self, Shutter};
 use crate::geometry::triangles;
 use crate::plan::FramePlan;
@@ -167,10 +167,13 @@ impl<'s> Renderer<'s> {
         match &mut self.topology {
             Some((indices, topology, _)) if *indices == geometry.indices => topology.update(&triangles),
             other => {
+                // What is transparent is seen through a grid of its own.
+                let transparent = transparent_triangles(self.scene, geometry);
+                let opaque = |prim: u32| transparent.get(prim as usize) != Some(&true);
                 *other = Some((
                     geometry.indices.clone(),
                     Topology::analyse(&triangles),
-                    Clusters::new(&triangles),
+                    Clusters::of(&triangles, opaque),
                 ));
             }
         }

@@ -16,6 +16,8 @@ pub struct RenderOptions {
     pub shadows: bool,
     /// Which sides of triangles cast them.
     pub casters: CasterPolicy,
+    /// Whether blended surfaces colour the light they let through; they dim it otherwise.
+    pub tinted_shadows: bool,
     /// Radiance that surrounds the scene, for surfaces that no light reaches.
     pub ambient: Vec3,
     /// Radiance where no surface is seen.
@@ -45,6 +47,7 @@ impl Default for RenderOptions {
             height: 1080,
             shadows: true,
             casters: CasterPolicy::Auto,
+            tinted_shadows: false,
             ambient: Vec3::splat(0.1),
             background: Vec3::new(0.44, 0.54, 0.68),
             pixel_samples: 1,

@@ -6,7 +6,8 @@
 //! | eye rays | one tiled perspective grid (HM08 §5.1) |
 //! | shadow rays of a light | one perspective grid each (HM08 §5.2) |
 //! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3) |
-//! | what lies behind masked and blended surfaces | a hierarchy, if there are any |
+//! | those of eye and lights through masked and blended surfaces | a grid of these alone for each, if there are any |
+//! | those of lights with a size through them | a hierarchy, if there are both |
 
 use glam::DVec3;
 use rayward_scene::{FrameGeometry, LightKind, PosedLight};

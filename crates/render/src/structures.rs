@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Bvh, Clusters, EyeGrid, Light, LightQuery, LitPixels, PointLightGrid, SimdLevel, Tile,
-    View, Visibility,
+    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, PointLightGrid,
+    SimdLevel, Tile, View, Visibility,
 };
 
 use crate::casters::CasterRules;
@@ -23,7 +23,11 @@ pub struct FrameStructures<'g> {
     pub visibility: Option<Visibility>,
     /// One entry a light, as in the plan.
     pub lights: Vec<LightShadows<'g>>,
-    /// A hierarchy of all triangles, for rays that pass through masked and blended ones; `None` without such.
+    /// The camera's grid over masked and blended triangles; `None` without such.
+    pub veils: Option<EyeVeils<'g>>,
+    /// One entry a light: its grid over masked and blended triangles, if there are any and it has one end.
+    pub light_veils: Vec<Option<PointLightGrid<'g>>>,
+    /// A hierarchy of all triangles, for lights with a size where there are masked or blended ones.
     pub layers: Option<Bvh<'g>>,
     /// What each structure cost.
     pub stats: Vec<StructureStats>,
@@ -61,7 +65,8 @@ impl<'g> FrameStructures<'g> {
         let eye = if plan.eye.hierarchy {
             EyeGrid::build_clustered(view, triangles, clusters, plan.eye, options.level)
         } else {
-            EyeGrid::build(view, triangles, plan.eye, options.level)
+            let opaque = |prim| !rules.is_transparent(prim);
+            EyeGrid::build_of(view, triangles, opaque, plan.eye, options.level)
         };
         stats.push(StructureStats {
             name: "eye grid".into(),
@@ -87,10 +92,11 @@ impl<'g> FrameStructures<'g> {
             visibility
         });
 
-        let mut lights = Vec::with_capacity(plan.lights.len());
+        let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
         for (i, plan) in plan.lights.iter().enumerate() {
             let Some(plan) = plan else {
                 lights.push(LightShadows::Nothing);
+                light_veils.push(None);
                 continue;
             };
             let name = if plan.name.is_empty() {
@@ -109,9 +115,42 @@ impl<'g> FrameStructures<'g> {
             );
             stats.push(shadows.stats(&name, start));
             lights.push(shadows);
+            let has_veils = rules.any_transparent() && plan.area.is_none();
+            light_veils.push(has_veils.then(|| {
+                let start = Instant::now();
+                let rule = |prim| {
+                    if rules.is_transparent(prim) {
+                        Casts::Both
+                    } else {
+                        Casts::Nothing
+                    }
+                };
+                let grid = PointLightGrid::build(plan.light, triangles, &rule, plan.grid, options.level);
+                stats.push(StructureStats {
+                    name: format!("light grid of veils {name}"),
+                    build: start.elapsed(),
+                    bytes: grid.bytes(),
+                    cells: grid.cell_count(),
+                    references: grid.reference_count(),
+                });
+                grid
+            }));
         }
 
-        let layers = rules.any_transparent().then(|| {
+        let veils = rules.any_transparent().then(|| {
+            let start = Instant::now();
+            let veils = EyeVeils::build(view, triangles, |prim| rules.is_transparent(prim), options.level);
+            stats.push(StructureStats {
+                name: "eye veils".into(),
+                build: start.elapsed(),
+                bytes: veils.bytes(),
+                cells: veils.cell_count(),
+                references: veils.reference_count(),
+            });
+            veils
+        });
+        let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
+        let layers = (soft && rules.any_transparent()).then(|| {
             let start = Instant::now();
             let bvh = Bvh::build(triangles);
             stats.push(StructureStats {
@@ -127,6 +166,8 @@ impl<'g> FrameStructures<'g> {
             eye,
             visibility,
             lights,
+            veils,
+            light_veils,
             layers,
             stats,
         }

@@ -7,8 +7,9 @@ use std::ops::ControlFlow;
 
 use glam::{Vec2, Vec3};
 use rayward_scene::FrameGeometry;
+use rayward_trace::exact::{self, ExactHit};
 use rayward_trace::{
-    AreaCounts, AreaScratch, Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, ViewRay, exact,
+    AreaCounts, AreaScratch, Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, TileVeils, ViewRay,
 };
 
 use crate::geometry::triangles;
@@ -43,11 +44,20 @@ pub(crate) struct TileWork {
     pixels: Vec<u32>,
     visible: Vec<u32>,
     area: AreaScratch,
-    layers: Vec<(f64, u32)>,
+    veils: TileVeils,
+    veil_scratch: ShadowScratch,
+    passed: Vec<Vec3>,
     filters: Vec<u32>,
 }
 
-/// A surface seen by a pixel, or one of several behind each other.
+/// What has been seen of a pixel so far.
+struct Seen {
+    sample: Sample,
+    /// Share of the pixel that nothing covers yet.
+    left: f32,
+}
+
+/// A surface seen by a pixel, one of several behind each other if those before are transparent.
 struct ShadedPoint {
     x: u32,
     y: u32,
@@ -98,6 +108,11 @@ impl TileShader<'_> {
         if !traced {
             self.structures.eye.trace_tile(&tile, &mut work.hits);
         }
+        if let Some(veils) = &self.structures.veils {
+            let (hits, structures) = (&work.hits, self.structures);
+            let opaque = |x, y| structures.seen(&tile, x, y).unwrap_or_else(|| hits.prim(x, y));
+            veils.trace_tile(&tile, opaque, &mut work.veils);
+        }
         work.points.clear();
         work.scratch.counts = rayward_trace::ShadowCounts::default();
         work.area.counts = AreaCounts::default();
@@ -121,95 +136,93 @@ impl TileShader<'_> {
         }
     }
 
-    /// Notes the surfaces that a pixel sees; returns the pixel without their light.
+    /// Notes the surfaces that a pixel sees, front to back until they cover it; returns the pixel without their
+    /// light. The layers are those of the first surface of which anything is seen.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
         let background = Sample::background(self.options.background);
-        let seen = self.structures.seen(tile, x, y);
-        let Some(prim) = seen.unwrap_or_else(|| work.hits.prim(x, y)) else {
+        let TileWork {
+            hits, veils, points, ..
+        } = work;
+        let through = match &self.structures.veils {
+            Some(_) => veils.pixel(x, y),
+            None => &[],
+        };
+        let opaque = self
+            .structures
+            .seen(tile, x, y)
+            .unwrap_or_else(|| hits.prim(x, y));
+        if opaque.is_none() && through.is_empty() {
             return background;
-        };
-        let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
-        let Some((hit, first)) = self.point([x, y], &ray, prim, 1.0) else {
-            return background;
-        };
-        let (depth, covered) = (hit.t as f32, first.weight);
-        let mut sample = Sample {
-            color: Vec3::ZERO,
-            alpha: 1.0,
-            depth,
-            distance: depth * ray.dir.length() as f32,
-            normal: first.surface.normal,
-            object: object_of(self.geometry, prim),
-            prim,
-            bary: Vec2::new(hit.u as f32, hit.v as f32),
-        };
-        work.points.push(first);
-        let mut left = 1.0 - covered;
-        if let (true, Some(bvh)) = (left > 0.0, &self.structures.layers) {
-            left = self.see_through(bvh, [x, y], &ray, (hit.t, prim), left, work);
         }
-        sample.alpha = 1.0 - left;
-        sample.color = self.options.background * left;
-        sample
+        let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
+        let mut seen = Seen {
+            sample: background,
+            left: 1.0,
+        };
+        for veil in through {
+            self.note([x, y], &ray, veil.prim, &veil.hit, &mut seen, points);
+            if seen.left < INVISIBLE {
+                seen.left = 0.0;
+                break;
+            }
+        }
+        if let Some(prim) = opaque.filter(|_| seen.left > 0.0)
+            && let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))
+        {
+            self.note([x, y], &ray, prim, &hit, &mut seen, points);
+        }
+        seen.sample.alpha = 1.0 - seen.left;
+        seen.sample.color = self.options.background * seen.left;
+        seen.sample
     }
 
-    /// Where a ray meets a triangle that it is known to meet, and the surface there; `left` is the share of the
-    /// pixel that nothing before it covers.
-    fn point(
+    /// Notes a surface where a ray meets it, if any of it is seen.
+    fn note(
         &self,
         [x, y]: [u32; 2],
         ray: &ViewRay,
         prim: u32,
-        left: f32,
-    ) -> Option<(exact::ExactHit, ShadedPoint)> {
-        let hit = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))?;
+        hit: &ExactHit,
+        seen: &mut Seen,
+        points: &mut Vec<ShadedPoint>,
+    ) {
+        let (depth, object) = (hit.t as f32, object_of(self.geometry, prim));
+        let bary = Vec2::new(hit.u as f32, hit.v as f32);
         let surface = self.shader.surface(
             self.geometry,
             &SurfacePoint {
                 prim,
-                object: object_of(self.geometry, prim),
-                u: hit.u as f32,
-                v: hit.v as f32,
+                object,
+                u: bary.x,
+                v: bary.y,
                 view: (-ray.dir.normalize()).as_vec3(),
-                footprint: self.camera.footprint(hit.t as f32),
+                footprint: self.camera.footprint(depth),
             },
         );
-        let point = ShadedPoint {
+        let weight = seen.left * surface.alpha;
+        if weight <= 0.0 {
+            return;
+        }
+        if seen.left == 1.0 {
+            seen.sample = Sample {
+                depth,
+                distance: depth * ray.dir.length() as f32,
+                normal: surface.normal,
+                object,
+                prim,
+                bary,
+                ..seen.sample
+            };
+        }
+        seen.left -= weight;
+        points.push(ShadedPoint {
             x,
             y,
             receiver: Receiver::along(ray, hit.t, prim),
-            weight: left * surface.alpha,
+            weight,
             color: ambient(&surface, self.options.ambient),
             surface,
-        };
-        Some((hit, point))
-    }
-
-    /// Notes what is seen behind a surface that does not cover its pixel, front to back; returns the share of the
-    /// pixel that nothing covers.
-    fn see_through(
-        &self,
-        bvh: &Bvh,
-        pixel: [u32; 2],
-        ray: &ViewRay,
-        first: (f64, u32),
-        mut left: f32,
-        work: &mut TileWork,
-    ) -> f32 {
-        bvh.along(ray, &mut (), &mut work.layers);
-        for &(_, prim) in work.layers.iter().skip_while(|hit| **hit != first).skip(1) {
-            let Some((_, point)) = self.point(pixel, ray, prim, left) else {
-                continue;
-            };
-            left -= point.weight;
-            if point.weight > 0.0 {
-                work.points.push(point);
-            }
-            if left < INVISIBLE {
-                return 0.0;
-            }
-        }
-        left
+        });
     }
 
     /// Adds the light of one source to all points of the tile that it reaches.
@@ -229,7 +242,8 @@ impl TileShader<'_> {
             asked,
             shadow,
             scratch,
-            filters,
+            veil_scratch,
+            passed,
             ..
         } = work;
         receivers.clear();
@@ -249,16 +263,13 @@ impl TileShader<'_> {
                 shadow.resize(receivers.len(), false);
             }
         }
-        for ((&(i, radiance), receiver), _) in asked
-            .iter()
-            .zip(&*receivers)
-            .zip(&*shadow)
-            .filter(|(_, in_shadow)| !**in_shadow)
-        {
-            let passed = match (&self.structures.layers, &self.ends[light]) {
-                (Some(bvh), Some(plan)) => self.transmittance(bvh, receiver, &plan.light, filters),
-                _ => 1.0,
-            };
+        // From here on those that nothing opaque hides.
+        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
+        receivers.retain(|_| kept.next() == Some(true));
+        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
+        asked.retain(|_| kept.next() == Some(true));
+        self.pass(light, receivers, veil_scratch, passed);
+        for (&(i, radiance), &passed) in asked.iter().zip(&*passed) {
             points[i as usize].color += radiance * passed;
         }
     }
@@ -274,28 +285,47 @@ impl TileShader<'_> {
         (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
     }
 
-    /// Share of the light that masked and blended triangles let through to a receiver.
-    fn transmittance(&self, bvh: &Bvh, receiver: &Receiver, light: &Light, filters: &mut Vec<u32>) -> f32 {
-        let (origin, dir) = match *light {
-            Light::Point(position) => (position.as_dvec3(), receiver.point - position.as_dvec3()),
-            Light::Directional(direction) => (receiver.point, direction.as_dvec3()),
+    /// Share of a light that masked and blended triangles let through to each receiver. The product is taken in the
+    /// order of ids, so it does not depend on the structure.
+    fn pass(
+        &self,
+        light: usize,
+        receivers: &[Receiver],
+        scratch: &mut ShadowScratch,
+        passed: &mut Vec<Vec3>,
+    ) {
+        passed.clear();
+        passed.resize(receivers.len(), Vec3::ONE);
+        let Some(grid) = &self.structures.light_veils[light] else {
+            return;
         };
+        let (geometry, tinted) = (self.geometry, self.options.tinted_shadows);
+        grid.each_between(receivers, scratch, |i, prim, hit| {
+            let (object, u, v) = (object_of(geometry, prim), hit.u as f32, hit.v as f32);
+            passed[i] *= self.shader.transmittance(geometry, prim, object, [u, v], tinted);
+            if passed[i] == Vec3::ZERO {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// As [`Self::pass`], of one receiver and any light.
+    fn transmittance(&self, bvh: &Bvh, receiver: &Receiver, light: &Light, filters: &mut Vec<u32>) -> Vec3 {
+        let (origin, dir) = exact::shadow_line(receiver, light);
         filters.clear();
         bvh.each_shadow(receiver, light, &mut (), |prim| {
             filters.push(prim);
             ControlFlow::Continue(())
         });
         filters.sort_unstable();
-        let coverage = |&prim: &u32| {
-            let hit = exact::attributes(origin, dir, triangles(self.geometry).corners(prim))?;
-            let object = object_of(self.geometry, prim);
-            let (u, v) = (hit.u as f32, hit.v as f32);
-            Some(self.shader.coverage(self.geometry, prim, object, u, v))
+        let (geometry, tinted) = (self.geometry, self.options.tinted_shadows);
+        let passed = |&prim: &u32| {
+            let hit = exact::attributes(origin, dir, triangles(geometry).corners(prim))?;
+            let place = [hit.u as f32, hit.v as f32];
+            let object = object_of(geometry, prim);
+            Some(self.shader.transmittance(geometry, prim, object, place, tinted))
         };
-        filters
-            .iter()
-            .filter_map(coverage)
-            .map(|covered| 1.0 - covered)
-            .product()
+        filters.iter().filter_map(passed).product()
     }
 }

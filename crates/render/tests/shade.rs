@@ -377,7 +377,10 @@ fn masks_are_solid_or_absent() {
         let (scene, geometry) = triangle(material);
         let shader = Shader::new(&scene);
         assert_eq!(shader.surface(&geometry, &point(Vec3::Z)).alpha, want);
-        assert_eq!(shader.coverage(&geometry, 0, 0, 0.2, 0.2), want);
+        assert_eq!(
+            shader.transmittance(&geometry, 0, 0, [0.2, 0.2], false),
+            Vec3::splat(1.0 - want)
+        );
     }
 }
 

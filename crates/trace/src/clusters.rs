@@ -44,6 +44,11 @@ pub(crate) struct Cluster<'a> {
 impl Clusters {
     /// Groups these triangles, wherever they will move.
     pub fn new(triangles: &Triangles) -> Self {
+        Self::of(triangles, |_| true)
+    }
+
+    /// As [`Clusters::new`], of those triangles alone for which `keep` holds; the others are not seen.
+    pub fn of(triangles: &Triangles, keep: impl Fn(u32) -> bool) -> Self {
         let centroids: Vec<Vec3> = (0..triangles.len() as u32)
             .map(|prim| {
                 let [a, b, c] = triangles.corners(prim);
@@ -51,7 +56,7 @@ impl Clusters {
             })
             .collect();
         // Of several triangles with the same corners in the same order the first is always the closest.
-        let mut prims: Vec<u32> = (0..triangles.len() as u32).collect();
+        let mut prims: Vec<u32> = (0..triangles.len() as u32).filter(|&prim| keep(prim)).collect();
         prims.sort_unstable_by_key(|&p| (triangles.indices[p as usize], p));
         prims.dedup_by_key(|p| triangles.indices[*p as usize]);
         let mut counts = Vec::new();

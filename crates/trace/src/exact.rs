@@ -167,7 +167,11 @@ pub fn blocks(corners: [Vec3; 3], receiver: &Receiver, light: &Light) -> bool {
 #[inline]
 pub fn shadow_hit(triangles: &Triangles, prim: u32, receiver: &Receiver, light: &Light) -> Option<ExactHit> {
     let own = prim == receiver.prim;
-    if own { None } else { between(triangles.corners(prim), receiver, light) }
+    if own {
+        None
+    } else {
+        between(triangles.corners(prim), receiver, light)
+    }
 }
 
 #[inline]

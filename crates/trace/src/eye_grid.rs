@@ -162,9 +162,20 @@ const VERTEX_CHUNK: usize = 16 * 1024;
 impl<'a> EyeGrid<'a> {
     /// Builds the grid, on all threads of the current rayon pool.
     pub fn build(view: View, triangles: Triangles<'a>, options: EyeGridOptions, level: SimdLevel) -> Self {
+        Self::build_of(view, triangles, |_| true, options, level)
+    }
+
+    /// As [`EyeGrid::build`], of those triangles alone for which `keep` holds.
+    pub fn build_of(
+        view: View,
+        triangles: Triangles<'a>,
+        keep: impl Fn(u32) -> bool + Sync,
+        options: EyeGridOptions,
+        level: SimdLevel,
+    ) -> Self {
         let grid = cells(&view, &options);
         let vertices = project_all(level, &view, &triangles);
-        let bins = Bins::build(&view, &triangles, &vertices, &grid, options.binning, |_| true);
+        let bins = Bins::build(&view, &triangles, &vertices, &grid, options.binning, keep);
         let content = Content::Triangles { vertices, bins };
         Self::new(view, triangles, grid, content, options, level)
     }

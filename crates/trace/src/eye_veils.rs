@@ -2,7 +2,7 @@
 //!
 //! HM08 §5.1's grid with a list in each pixel instead of one triangle. Masked and blended triangles are sorted into
 //! cells of 4 x 4 pixels, and each cell's are tested against its rays at once; where a pixel has an opaque triangle
-//! (of an [`EyeGrid`] without them), only what lies before that is kept. The order is that of hits: by `t`, then by
+//! (of an [`crate::EyeGrid`] without them), only what lies before that is kept. The order is that of hits: by `t`, then by
 //! id, so a picture does not depend on the order of triangles.
 //!
 //! Layout: 72 bytes a triangle, 4 bytes a reference, 4 bytes a cell and chunk of triangles; 40 bytes a hit and 8 bytes

@@ -254,16 +254,33 @@ impl<'s> Shader<'s> {
         Self { materials, textures }
     }
 
-    /// Coverage of a material at a point: the alpha of [`Self::surface`] for a fraction of its cost, for rays
-    /// that pass through masked and blended surfaces. Textures are not filtered.
-    pub fn coverage(&self, geometry: &FrameGeometry, prim: u32, object: u32, u: f32, v: f32) -> f32 {
+    /// Share of light that a surface lets through at a point: what the alpha of [`Self::surface`] leaves, for a
+    /// fraction of its cost. Textures are not filtered.
+    ///
+    /// `tinted` light takes on the colour of blended surfaces as far as they cover: `(1 - a) (1 - a + a c)` for
+    /// coverage `a` and base colour `c`.
+    pub fn transmittance(
+        &self,
+        geometry: &FrameGeometry,
+        prim: u32,
+        object: u32,
+        [u, v]: [f32; 2],
+        tinted: bool,
+    ) -> Vec3 {
         let material = self.material(geometry, object);
         if material.alpha_mode == AlphaMode::Opaque {
-            return 1.0;
+            return Vec3::ZERO;
         }
         let corners = Corners::new(geometry, prim, u, v);
         let lookup = self.lookup(geometry, &corners, material, 0.0);
-        material.coverage(base_color(geometry, &corners, material, &lookup).w)
+        let base = base_color(geometry, &corners, material, &lookup);
+        let covered = material.coverage(base.w);
+        let left = Vec3::splat(1.0 - covered);
+        if tinted && material.alpha_mode == AlphaMode::Blend {
+            left * (left + base.xyz().clamp(Vec3::ZERO, Vec3::ONE) * covered)
+        } else {
+            left
+        }
     }
 
     /// The surface at a point.

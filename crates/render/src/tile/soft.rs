@@ -83,7 +83,7 @@ impl TileShader<'_> {
                 if let Some(sent) = sent {
                     let passed = match &self.structures.layers {
                         Some(bvh) => self.transmittance(bvh, &receiver, &end, &mut work.filters),
-                        None => 1.0,
+                        None => Vec3::ONE,
                     };
                     sum += sent * passed;
                 }
