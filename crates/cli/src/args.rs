@@ -9,7 +9,7 @@ use glam::{DVec3, Vec3};
 use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
-use crate::values::{self, Casters, LayerName, LightValue, Operator, Size, Up};
+use crate::values::{self, Casters, LayerName, LightValue, Operator, Shard, Size, Span, Up};
 
 const HELP: &str = "\
 Examples:
@@ -42,6 +42,16 @@ Examples:
   rayward render model.glb --npy layers --json > summary.json
   rayward render model.glb -o - | display";
 
+const ANIMATE_HELP: &str = "\
+Frame K shows the moment K / rate; the last frame is the one before the end. With --json, one object a frame and line.
+
+Examples:
+  rayward animate --builtin walker -o walk-####.png
+  rayward animate model.glb --animation Run --rate 30 --seconds 0..2 -o out/run-###.exr
+  rayward animate model.glb --frames 0..120 --turn 360 -o turn-####.png
+  rayward animate model.glb --resume              goes on after it was stopped
+  rayward animate model.glb --shard 1/4           the first of four processes that share the frames";
+
 /// Pictures of scenes, ray traced on the CPU: one structure for every camera and light, rebuilt every frame
 #[derive(Debug, Parser)]
 #[command(name = "rayward", version, arg_required_else_help = true, after_help = HELP)]
@@ -54,6 +64,8 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Render a scene to a picture
     Render(Box<RenderArgs>),
+    /// Render the frames of an animation, or of a turn around the scene, to numbered pictures
+    Animate(Box<AnimateArgs>),
     /// Say what is in a scene, and what of it will be skipped
     Info(InfoArgs),
     /// Compare two pictures of the same size
@@ -171,6 +183,61 @@ pub(crate) struct RenderArgs {
     pub(crate) target: TargetArgs,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// `rayward animate`
+#[derive(Debug, Args)]
+#[command(after_help = ANIMATE_HELP)]
+pub(crate) struct AnimateArgs {
+    #[command(flatten)]
+    pub(crate) source: SourceArgs,
+    /// Which animation plays, by name or index; the first unless given
+    #[arg(long, value_name = "NAME|INDEX", help_heading = "Scene")]
+    pub(crate) animation: Option<String>,
+    #[command(flatten)]
+    pub(crate) frames: FrameArgs,
+    #[command(flatten)]
+    pub(crate) view: ViewArgs,
+    #[command(flatten)]
+    pub(crate) picture: PictureArgs,
+    /// File of a frame, .png, .exr or .npy: # stands for a digit of its number
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        default_value = "frame-####.png",
+        help_heading = "Output"
+    )]
+    pub(crate) output: PathBuf,
+    /// Layers for .exr besides the colour; all unless given
+    #[arg(long, value_name = "LAYERS", value_delimiter = ',', help_heading = "Output")]
+    pub(crate) layers: Vec<LayerName>,
+    #[command(flatten)]
+    pub(crate) run: RunArgs,
+}
+
+/// Which frames.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Frames")]
+pub(crate) struct FrameArgs {
+    /// Frames a second
+    #[arg(long, value_name = "NUMBER", default_value_t = 24.0, value_parser = values::positive)]
+    pub(crate) rate: f64,
+    /// Frames from the first to the one before the end, FIRST..END; all of the animation unless given
+    #[arg(long, value_name = "FRAMES", value_parser = values::frames, conflicts_with = "seconds")]
+    pub(crate) frames: Option<Span<u32>>,
+    /// The same by time, FROM..TO in seconds
+    #[arg(long, value_name = "TIME", value_parser = values::seconds)]
+    pub(crate) seconds: Option<Span<f64>>,
+    /// The camera goes around the scene, by so many degrees over all frames
+    #[arg(long, value_name = "DEGREES", value_parser = values::degrees, allow_hyphen_values = true)]
+    pub(crate) turn: Option<f64>,
+    /// Frames whose file is there are left out
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// The I-th of N shares of the frames, I/N
+    #[arg(long, value_name = "I/N", value_parser = values::shard)]
+    pub(crate) shard: Option<Shard>,
 }
 
 /// How the picture is made.

@@ -49,18 +49,20 @@ impl Input {
     /// Poses the scene, if it is not too large to be posed.
     pub(crate) fn pose(&self, moment: &MomentArgs) -> Result<FrameGeometry, Failure> {
         self.check_size()?;
-        let names = self.scene.animations.iter().map(|animation| &*animation.name);
-        let animation = match &moment.animation {
-            Some(wanted) => choose("animation", wanted, names, &self.path)?,
-            None => 0,
-        };
+        let animation = self.animation(moment.animation.as_deref())?;
         let mut frame = FrameGeometry::default();
         self.scene.at_animation(Some(animation), moment.time, &mut frame);
         Ok(frame)
     }
 
+    /// Index of the animation of this name or index; the first if none is wanted.
+    pub(crate) fn animation(&self, wanted: Option<&str>) -> Result<usize, Failure> {
+        let names = self.scene.animations.iter().map(|animation| &*animation.name);
+        wanted.map_or(Ok(0), |wanted| choose("animation", wanted, names, &self.path))
+    }
+
     /// A few bytes of a file can ask for any number of instances.
-    fn check_size(&self) -> Result<(), Failure> {
+    pub(crate) fn check_size(&self) -> Result<(), Failure> {
         let too_large = |what: String, limit: String| scene::Error::TooLarge {
             path: self.path.clone(),
             place: "all instances together".into(),

@@ -3,6 +3,7 @@
 //! Data goes to standard output, all else to standard error; nothing but this program prints. Every way to end
 //! has its exit code, see [`failure::Code`].
 
+mod animate;
 mod args;
 mod bench;
 mod compare;
@@ -45,6 +46,7 @@ fn main() -> ExitCode {
 fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Animate(args) => animate::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Doctor(args) => doctor::run(&args),

@@ -20,6 +20,26 @@ impl Bar {
         Self(bar)
     }
 
+    /// As [`Bar::new`], for many frames: shows the time that is left.
+    pub(crate) fn of_frames(shown: bool) -> Self {
+        let bar = Self::new(shown);
+        let style = ProgressStyle::with_template("{msg} {bar:40} {pos}/{len}, {eta} left");
+        bar.0
+            .set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar
+    }
+
+    /// Sets the number of frames.
+    pub(crate) fn frames(&self, frames: u64) {
+        self.0.set_length(frames);
+        self.0.reset_eta();
+    }
+
+    /// One frame is done.
+    pub(crate) fn next_frame(&self) {
+        self.0.inc(1);
+    }
+
     /// Names what is being done.
     pub(crate) fn phase(&self, name: &'static str) {
         self.0.set_message(name);

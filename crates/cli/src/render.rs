@@ -119,7 +119,7 @@ fn picture(
 /// A picture that cannot fit is an error now instead of a killed process later.
 ///
 /// `pixel` is what it takes in bytes, film and writing together.
-fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Failure> {
+pub(crate) fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Failure> {
     let (width, height) = (options.width, options.height);
     let bytes = u128::from(width) * u128::from(height) * u128::from(pixel);
     match machine::available_memory() {
@@ -142,7 +142,8 @@ fn lens(args: &PictureArgs, camera: &PosedCamera, frame: &FrameGeometry) -> Opti
     })
 }
 
-fn options(args: &PictureArgs) -> RenderOptions {
+/// What the arguments ask of a frame.
+pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
     let defaults = RenderOptions::default();
     let size = size(args, &defaults);
     let spread = args.aperture.is_some() || args.shutter.is_some();

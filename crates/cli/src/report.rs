@@ -31,6 +31,14 @@ pub(crate) fn to_stdout_json(value: &impl Serialize) -> Result<(), Failure> {
     to_stdout(&bytes)
 }
 
+/// Writes one JSON object in one line.
+pub(crate) fn to_stdout_json_line(value: &impl Serialize) -> Result<(), Failure> {
+    let mut bytes = serde_json::to_vec(value)
+        .map_err(|error| Failure::new(Code::Runtime, format_args!("cannot make JSON: {error}")))?;
+    bytes.push(b'\n');
+    to_stdout(&bytes)
+}
+
 /// Says something to people. Nobody has to listen: a closed standard error is no error.
 pub(crate) fn note(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");

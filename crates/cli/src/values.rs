@@ -94,6 +94,58 @@ pub(crate) fn size(text: &str) -> Parsed<Size> {
         .ok_or_else(|| "it has to be like 1920x1080".into())
 }
 
+/// From a start to the end that no longer belongs to it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Span<T> {
+    pub(crate) start: T,
+    pub(crate) end: T,
+}
+
+fn span<T: PartialOrd>(text: &str, part: impl Fn(&str) -> Parsed<T>) -> Parsed<Span<T>> {
+    let (start, end) = text.split_once("..").ok_or("it has to be like 0..48")?;
+    let (start, end) = (part(start)?, part(end)?);
+    if start < end {
+        Ok(Span { start, end })
+    } else {
+        Err("its start is not before its end".into())
+    }
+}
+
+/// Frames `first..end`.
+pub(crate) fn frames(text: &str) -> Parsed<Span<u32>> {
+    span(text, |part| {
+        part.parse()
+            .map_err(|_| format!("{part:?} is not a frame's number"))
+    })
+}
+
+/// Seconds `from..to`, from 0 on.
+pub(crate) fn seconds(text: &str) -> Parsed<Span<f64>> {
+    span(text, not_negative)
+}
+
+/// An angle in degrees.
+pub(crate) fn degrees(text: &str) -> Parsed<f64> {
+    number(text)
+}
+
+/// One of several equal shares, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shard {
+    pub(crate) index: u32,
+    pub(crate) of: u32,
+}
+
+/// A share `i/n`.
+pub(crate) fn shard(text: &str) -> Parsed<Shard> {
+    let parse = || {
+        let (index, of) = text.split_once('/')?;
+        let (index, of) = (index.parse().ok()?, of.parse().ok()?);
+        (1..=of).contains(&index).then_some(Shard { index, of })
+    };
+    parse().ok_or_else(|| "it has to be like 1/4, and not above 4/4".into())
+}
+
 /// A light on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum LightValue {
@@ -331,6 +383,14 @@ mod tests {
         );
         for wrong in ["64", "0x48", "64x", "-1x5", "64x48x2", "99999999999x1"] {
             assert!(size(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(frames("3..9"), Ok(Span { start: 3, end: 9 }));
+        assert!(seconds("0..0.5").is_ok() && shard("4/4") == Ok(Shard { index: 4, of: 4 }));
+        for wrong in ["9..3", "3..3", "3", "-1..2", "a..b"] {
+            assert!(frames(wrong).is_err() && seconds(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["0/4", "5/4", "1", "1/0", "a/b"] {
+            assert!(shard(wrong).is_err(), "{wrong}");
         }
         assert!(field_of_view("0").is_err() && field_of_view("180").is_err() && field_of_view("40").is_ok());
     }

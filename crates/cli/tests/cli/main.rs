@@ -1,5 +1,6 @@
 //! The program from the outside: arguments and files in, exit codes, files and text out.
 
+mod animate;
 mod bad_input;
 mod bench;
 mod commands;

@@ -1,0 +1,239 @@
+//! `rayward animate`: the frames of an animation, or of a turn around the scene, to numbered pictures.
+//!
+//! Frame k shows the moment k / rate. Every frame is rendered by itself, so frames that were left out, made by
+//! another process or made again are the same to the bit; files are put in place as wholes, so one that is there is
+//! done. Geometry and renderer are kept from frame to frame, and structures are built anew in each.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use glam::DQuat;
+use rayward::scene::{FrameGeometry, PosedCamera};
+use rayward::{FrameStats, RenderOptions, Renderer};
+use serde::Serialize;
+
+use crate::args::{AnimateArgs, FrameArgs, TargetArgs};
+use crate::failure::{Code, Failure};
+use crate::input::{self, Input};
+use crate::machine;
+use crate::output::Targets;
+use crate::progress::Bar;
+use crate::render::{check_memory, options};
+use crate::report::{self, count, duration, milliseconds};
+use crate::values::{Shard, Span};
+use crate::view::View;
+
+/// One frame; its fields are those of the JSON object, one to a line.
+#[derive(Serialize)]
+struct FrameReport {
+    frame: u32,
+    time_s: f64,
+    file: String,
+    triangles: usize,
+    eye_rays: u64,
+    shadow_rays: u64,
+    pose_ms: f64,
+    build_ms: f64,
+    trace_ms: f64,
+    write_ms: f64,
+    peak_memory_bytes: Option<u64>,
+}
+
+/// Renders all frames that were asked for and are not there.
+pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
+    let start = Instant::now();
+    let level = machine::simd_level(args.run.simd.as_deref())?;
+    let first = target(args, 0)?;
+    let options = RenderOptions {
+        layers: first.layers,
+        level,
+        ..options(&args.picture)
+    };
+    check_memory(&options, first.bytes_a_pixel())?;
+    machine::start_threads(args.run.threads)?;
+    let bar = Bar::of_frames(!args.run.quiet);
+    bar.phase("reading");
+    let input = Input::read(&args.source)?;
+    input.check_size()?;
+    let animation = input.animation(args.animation.as_deref())?;
+    let frames = frames(&args.frames, &input, animation)?;
+    let wanted: Vec<u32> = (frames.start..frames.end)
+        .filter(|&frame| args.frames.shard.is_none_or(|shard| shard.has(frame)))
+        .filter(|&frame| !(args.frames.resume && numbered(&args.output, frame).is_file()))
+        .collect();
+
+    bar.phase("rendering");
+    bar.frames(wanted.len() as u64);
+    let mut renderer = Renderer::new(&input.scene);
+    let mut geometry = FrameGeometry::default();
+    for &frame in &wanted {
+        let time = f64::from(frame) / args.frames.rate;
+        let pose = Instant::now();
+        input
+            .scene
+            .at_animation(Some(animation), time as f32, &mut geometry);
+        let pose_ms = milliseconds(pose.elapsed());
+        let aspect = f64::from(options.width) / f64::from(options.height);
+        let mut view = View::choose(&args.view, &input, &geometry, aspect)?;
+        if let Some(degrees) = args.frames.turn {
+            let share = f64::from(frame - frames.start) / f64::from(frames.end - frames.start);
+            turn(&mut view.camera, &geometry, (degrees * share).to_radians());
+        }
+        let rendered = renderer.render(&geometry, &view.camera, &view.lights, &options, &|_| ())?;
+        let write = Instant::now();
+        let files = target(args, frame)?.write(&rendered.film)?;
+        bar.next_frame();
+        if args.run.json {
+            let write_ms = milliseconds(write.elapsed());
+            report::to_stdout_json_line(&FrameReport::new(
+                frame,
+                time,
+                &files,
+                &rendered.stats,
+                pose_ms,
+                write_ms,
+            ))?;
+        }
+    }
+    drop(bar);
+    if !args.run.quiet {
+        let there = (frames.end - frames.start) as usize - wanted.len();
+        report::note(&format!(
+            "{} rendered in {}, {there} left out",
+            count(wanted.len(), "frame"),
+            duration(start.elapsed())
+        ));
+    }
+    Ok(())
+}
+
+impl FrameReport {
+    fn new(
+        frame: u32,
+        time_s: f64,
+        files: &[PathBuf],
+        stats: &FrameStats,
+        pose_ms: f64,
+        write_ms: f64,
+    ) -> Self {
+        Self {
+            frame,
+            time_s,
+            file: files
+                .first()
+                .map(|file| file.display().to_string())
+                .unwrap_or_default(),
+            triangles: stats.triangles,
+            eye_rays: stats.eye_rays,
+            shadow_rays: stats.shadow_rays,
+            pose_ms,
+            build_ms: milliseconds(stats.build),
+            trace_ms: milliseconds(stats.trace),
+            write_ms,
+            peak_memory_bytes: machine::peak_memory(),
+        }
+    }
+}
+
+/// Where a frame goes, checked.
+fn target(args: &AnimateArgs, frame: u32) -> Result<Targets, Failure> {
+    if args.output.as_os_str() == "-" {
+        return Err(Failure::new(Code::Usage, "--output -: frames go to files"));
+    }
+    let target = TargetArgs {
+        output: Some(numbered(&args.output, frame)),
+        npy: None,
+        layers: args.layers.clone(),
+    };
+    Targets::new(&target, &args.picture, false)
+}
+
+/// The file of a frame: the last run of `#` in the name stands for its number, or the end of the stem does.
+fn numbered(pattern: &Path, frame: u32) -> PathBuf {
+    let name = pattern.file_name().unwrap_or_default().to_string_lossy();
+    let name = match name.rfind('#') {
+        Some(last) => {
+            let stem = name[..=last].trim_end_matches('#');
+            let width = last + 1 - stem.len();
+            format!("{stem}{frame:0width$}{}", &name[last + 1..])
+        }
+        None => {
+            let dot = name.rfind('.').unwrap_or(name.len());
+            format!("{}-{frame:04}{}", &name[..dot], &name[dot..])
+        }
+    };
+    pattern.with_file_name(name)
+}
+
+/// The frames asked for: by number, by time, or all of the animation.
+fn frames(args: &FrameArgs, input: &Input, animation: usize) -> Result<Span<u32>, Failure> {
+    if let Some(frames) = args.frames {
+        return Ok(frames);
+    }
+    let seconds = match (args.seconds, input.scene.animations.get(animation)) {
+        (Some(seconds), _) => seconds,
+        (None, Some(animation)) => Span {
+            start: 0.0,
+            end: f64::from(animation.duration()),
+        },
+        (None, None) => {
+            return Err(Failure::new(
+                Code::Usage,
+                format_args!(
+                    "--frames or --seconds: {} has no animation that says how many",
+                    input.path.display()
+                ),
+            ));
+        }
+    };
+    let frame = |seconds: f64| (seconds * args.rate - 1e-6).ceil().max(0.0) as u32;
+    let span = Span {
+        start: frame(seconds.start),
+        end: frame(seconds.end),
+    };
+    if span.start < span.end {
+        Ok(span)
+    } else {
+        Err(Failure::new(
+            Code::Usage,
+            "--seconds: there is no frame in this time",
+        ))
+    }
+}
+
+/// Turns a camera around the vertical axis through the middle of the frame.
+fn turn(camera: &mut PosedCamera, geometry: &FrameGeometry, angle: f64) {
+    let center = input::center(geometry);
+    let rotation = DQuat::from_rotation_y(angle);
+    camera.eye = center + rotation * (camera.eye - center);
+    camera.forward = rotation * camera.forward;
+    camera.up = rotation * camera.up;
+}
+
+impl Shard {
+    fn has(self, frame: u32) -> bool {
+        frame % self.of == self.index - 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_hold_the_number_of_the_frame() {
+        let name = |pattern: &str| numbered(Path::new(pattern), 7).display().to_string();
+        assert_eq!(name("a/frame-####.png"), "a/frame-0007.png");
+        assert_eq!(name("#.exr"), "7.exr");
+        assert_eq!(name("b#/walk.png"), "b#/walk-0007.png");
+        assert_eq!(name("a##b#.png"), "a##b7.png");
+    }
+
+    #[test]
+    fn shards_share_all_frames() {
+        let shard = |index| Shard { index, of: 3 };
+        for frame in 0..20 {
+            assert_eq!((1..=3).filter(|&index| shard(index).has(frame)).count(), 1);
+        }
+    }
+}
