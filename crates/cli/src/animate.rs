@@ -1,4 +1,4 @@
-//! `rayward animate`: the frames of an animation, or of a turn around the scene, to numbered pictures.
+//! `rayward animate`: the frames of an animation, or of a turn around the scene, to numbered pictures or a movie.
 //!
 //! Frame k shows the moment k / rate. Every frame is rendered by itself, so frames that were left out, made by
 //! another process or made again are the same to the bit; files are put in place as wholes, so one that is there is
@@ -8,8 +8,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DQuat;
+use rayward::image_io::{MovieOptions, is_movie, write_movie};
 use rayward::scene::{FrameGeometry, PosedCamera};
-use rayward::{FrameStats, RenderOptions, Renderer};
+use rayward::{FrameStats, RenderOptions, RenderedFrame, Renderer};
 use serde::Serialize;
 
 use crate::args::{AnimateArgs, FrameArgs, TargetArgs};
@@ -39,10 +40,32 @@ struct FrameReport {
     peak_memory_bytes: Option<u64>,
 }
 
+/// What all frames share.
+struct Job<'a> {
+    args: &'a AnimateArgs,
+    input: &'a Input,
+    animation: usize,
+    frames: Span<u32>,
+    options: RenderOptions,
+    renderer: Renderer<'a>,
+    geometry: FrameGeometry,
+}
+
 /// Renders all frames that were asked for and are not there.
 pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
     let start = Instant::now();
     let level = machine::simd_level(args.run.simd.as_deref())?;
+    let movie = is_movie(&args.output);
+    if movie && (args.frames.resume || args.frames.shard.is_some()) {
+        return Err(Failure::new(
+            Code::Usage,
+            format_args!(
+                "--output {}: a movie is made in one go; --resume and --shard are for numbered pictures, which \
+                 `rayward merge` joins",
+                args.output.display()
+            ),
+        ));
+    }
     let first = target(args, 0)?;
     let options = RenderOptions {
         layers: first.layers,
@@ -64,35 +87,20 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
 
     bar.phase("rendering");
     bar.frames(wanted.len() as u64);
-    let mut renderer = Renderer::new(&input.scene);
-    let mut geometry = FrameGeometry::default();
-    for &frame in &wanted {
-        let time = f64::from(frame) / args.frames.rate;
-        let pose = Instant::now();
-        input
-            .scene
-            .at_animation(Some(animation), time as f32, &mut geometry);
-        let pose_ms = milliseconds(pose.elapsed());
-        let aspect = f64::from(options.width) / f64::from(options.height);
-        let mut view = View::choose(&args.view, &input, &geometry, aspect)?;
-        if let Some(degrees) = args.frames.turn {
-            let share = f64::from(frame - frames.start) / f64::from(frames.end - frames.start);
-            turn(&mut view.camera, &geometry, (degrees * share).to_radians());
-        }
-        let rendered = renderer.render(&geometry, &view.camera, &view.lights, &options, &|_| ())?;
-        let write = Instant::now();
-        let files = target(args, frame)?.write(&rendered.film)?;
-        bar.next_frame();
-        if args.run.json {
-            let write_ms = milliseconds(write.elapsed());
-            report::to_stdout_json_line(&FrameReport::new(
-                frame,
-                time,
-                &files,
-                &rendered.stats,
-                pose_ms,
-                write_ms,
-            ))?;
+    let mut job = Job {
+        args,
+        input: &input,
+        animation,
+        frames,
+        options,
+        renderer: Renderer::new(&input.scene),
+        geometry: FrameGeometry::default(),
+    };
+    if movie {
+        job.movie(&wanted, &first, &bar)?;
+    } else {
+        for &frame in &wanted {
+            job.frame(frame, &bar, |rendered| target(args, frame)?.write(&rendered.film))?;
         }
     }
     drop(bar);
@@ -105,6 +113,62 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         ));
     }
     Ok(())
+}
+
+impl Job<'_> {
+    /// Renders a frame, has it written, which gives its files, and reports it.
+    fn frame(
+        &mut self,
+        frame: u32,
+        bar: &Bar,
+        write: impl FnOnce(&RenderedFrame) -> Result<Vec<PathBuf>, Failure>,
+    ) -> Result<(), Failure> {
+        let (args, options) = (self.args, &self.options);
+        let time = f64::from(frame) / args.frames.rate;
+        let pose = Instant::now();
+        let geometry = &mut self.geometry;
+        self.input
+            .scene
+            .at_animation(Some(self.animation), time as f32, geometry);
+        let pose_ms = milliseconds(pose.elapsed());
+        let aspect = f64::from(options.width) / f64::from(options.height);
+        let mut view = View::choose(&args.view, self.input, geometry, aspect)?;
+        if let Some(degrees) = args.frames.turn {
+            let share = f64::from(frame - self.frames.start) / f64::from(self.frames.end - self.frames.start);
+            turn(&mut view.camera, geometry, (degrees * share).to_radians());
+        }
+        let rendered = self
+            .renderer
+            .render(geometry, &view.camera, &view.lights, options, &|_| ())?;
+        let writing = Instant::now();
+        let files = write(&rendered)?;
+        bar.next_frame();
+        if args.run.json {
+            let write_ms = milliseconds(writing.elapsed());
+            let report = FrameReport::new(frame, time, &files, &rendered.stats, pose_ms, write_ms);
+            report::to_stdout_json_line(&report)?;
+        }
+        Ok(())
+    }
+
+    /// Renders all frames into one file.
+    fn movie(&mut self, frames: &[u32], target: &Targets, bar: &Bar) -> Result<(), Failure> {
+        let path = &self.args.output;
+        let movie = MovieOptions {
+            width: self.options.width,
+            height: self.options.height,
+            frames: frames.len() as u32,
+            rate: self.args.frames.rate,
+        };
+        let mut next = frames.iter();
+        write_movie(path, &movie, |rgb| match next.next() {
+            Some(&frame) => self.frame(frame, bar, |rendered| {
+                *rgb = target.encode(&rendered.film);
+                Ok(vec![path.clone()])
+            }),
+            None => Ok(()),
+        })
+    }
 }
 
 impl FrameReport {
@@ -140,8 +204,14 @@ fn target(args: &AnimateArgs, frame: u32) -> Result<Targets, Failure> {
     if args.output.as_os_str() == "-" {
         return Err(Failure::new(Code::Usage, "--output -: frames go to files"));
     }
+    let name = if is_movie(&args.output) {
+        // Its pictures are made as those of a PNG are.
+        args.output.with_extension("png")
+    } else {
+        numbered(&args.output, frame)
+    };
     let target = TargetArgs {
-        output: Some(numbered(&args.output, frame)),
+        output: Some(name),
         npy: None,
         layers: args.layers.clone(),
     };

@@ -49,6 +49,7 @@ Examples:
   rayward animate --builtin walker -o walk-####.png
   rayward animate model.glb --animation Run --rate 30 --seconds 0..2 -o out/run-###.exr
   rayward animate model.glb --frames 0..120 --turn 360 -o turn-####.png
+  rayward animate model.glb --turn 360 --frames 0..48 -o turn.gif
   rayward animate model.glb --resume              goes on after it was stopped
   rayward animate model.glb --shard 1/4           the first of four processes that share the frames";
 
@@ -64,8 +65,10 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Render a scene to a picture
     Render(Box<RenderArgs>),
-    /// Render the frames of an animation, or of a turn around the scene, to numbered pictures
+    /// Render the frames of an animation, or of a turn around the scene, to numbered pictures or a movie
     Animate(Box<AnimateArgs>),
+    /// Join numbered pictures to a movie
+    Merge(MergeArgs),
     /// Say what is in a scene, and what of it will be skipped
     Info(InfoArgs),
     /// Compare two pictures of the same size
@@ -200,7 +203,8 @@ pub(crate) struct AnimateArgs {
     pub(crate) view: ViewArgs,
     #[command(flatten)]
     pub(crate) picture: PictureArgs,
-    /// File of a frame, .png, .exr or .npy: # stands for a digit of its number
+    /// File of a frame, .png, .exr or .npy: # stands for a digit of its number. Or a movie: .apng, .gif, and by an
+    /// installed ffmpeg .mp4, .webm, .mkv
     #[arg(
         short,
         long,
@@ -214,6 +218,23 @@ pub(crate) struct AnimateArgs {
     pub(crate) layers: Vec<LayerName>,
     #[command(flatten)]
     pub(crate) run: RunArgs,
+}
+
+/// `rayward merge`
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// Pictures of one size, in order
+    #[arg(required = true, value_name = "FILES")]
+    pub(crate) pictures: Vec<PathBuf>,
+    /// The movie: .apng, .gif, and by an installed ffmpeg .mp4, .webm, .mkv
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// Pictures a second
+    #[arg(long, value_name = "NUMBER", default_value_t = 24.0, value_parser = values::positive)]
+    pub(crate) rate: f64,
+    /// No progress
+    #[arg(short, long)]
+    pub(crate) quiet: bool,
 }
 
 /// Which frames.

@@ -13,6 +13,7 @@ mod info;
 mod input;
 mod interrupt;
 mod machine;
+mod merge;
 mod output;
 mod progress;
 mod render;
@@ -47,6 +48,7 @@ fn run(command: Command) -> Result<(), Failure> {
     match command {
         Command::Render(args) => render::run(&args),
         Command::Animate(args) => animate::run(&args),
+        Command::Merge(args) => merge::run(&args),
         Command::Info(args) => info::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::Doctor(args) => doctor::run(&args),

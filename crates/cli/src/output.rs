@@ -124,7 +124,8 @@ impl Targets {
         report::to_stdout(&bytes)
     }
 
-    fn encode(&self, film: &Film) -> Vec<u8> {
+    /// Three sRGB bytes a pixel.
+    pub(crate) fn encode(&self, film: &Film) -> Vec<u8> {
         let mut mapper = ToneMapper::new(self.tone_map);
         if self.tone_map == ToneMap::PreviousFrame {
             mapper.end_frame(IntensityRange::of(&film.color));
@@ -144,7 +145,7 @@ fn form(path: &Path) -> Result<Form, Failure> {
         Some("exr") => Ok(Form::Exr),
         Some("npy") => Ok(Form::Npy),
         _ => Err(usage(format_args!(
-            "--output {}: the ending has to be .png, .exr or .npy",
+            "--output {}: the ending has to be .png, .exr or .npy, or of a movie for `rayward animate` and `rayward merge`",
             path.display()
         ))),
     }

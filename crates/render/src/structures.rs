@@ -59,37 +59,25 @@ impl<'g> FrameStructures<'g> {
         options: &RenderOptions,
     ) -> Self {
         let triangles = triangles(geometry);
-        let mut stats = Vec::new();
-
-        let start = Instant::now();
-        let eye = if plan.eye.hierarchy {
-            EyeGrid::build_clustered(view, triangles, clusters, plan.eye, options.level)
-        } else {
-            let opaque = |prim| !rules.is_transparent(prim);
-            EyeGrid::build_of(view, triangles, opaque, plan.eye, options.level)
-        };
-        stats.push(StructureStats {
-            name: "eye grid".into(),
-            build: start.elapsed(),
-            bytes: eye.bytes(),
-            cells: eye.tile_count() as usize,
-            references: eye.reference_count(),
-        });
+        let mut stats = Timed::default();
+        let eye = stats.build(
+            "eye grid",
+            || {
+                if plan.eye.hierarchy {
+                    return EyeGrid::build_clustered(view, triangles, clusters, plan.eye, options.level);
+                }
+                let opaque = |prim| !rules.is_transparent(prim);
+                EyeGrid::build_of(view, triangles, opaque, plan.eye, options.level)
+            },
+            |eye| [eye.bytes(), eye.tile_count() as usize, eye.reference_count()],
+        );
 
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
         let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(|p| p.area.is_none());
         let at_once = plan.lights.iter().any(hard) && !rules.any_transparent() && !options.paper;
         let visibility = at_once.then(|| {
-            let start = Instant::now();
-            let visibility = Visibility::trace(&eye, &|| ());
-            stats.push(StructureStats {
-                name: "visibility".into(),
-                build: start.elapsed(),
-                bytes: visibility.bytes(),
-                cells: 0,
-                references: 0,
-            });
-            visibility
+            let trace = || Visibility::trace(&eye, &|| ());
+            stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
         });
 
         let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
@@ -113,54 +101,33 @@ impl<'g> FrameStructures<'g> {
                 eye_point,
                 options.level,
             );
-            stats.push(shadows.stats(&name, start));
+            stats.0.push(shadows.stats(&name, start));
             lights.push(shadows);
             let has_veils = rules.any_transparent() && plan.area.is_none();
             light_veils.push(has_veils.then(|| {
-                let start = Instant::now();
-                let rule = |prim| {
-                    if rules.is_transparent(prim) {
-                        Casts::Both
-                    } else {
-                        Casts::Nothing
-                    }
-                };
-                let grid = PointLightGrid::build(plan.light, triangles, &rule, plan.grid, options.level);
-                stats.push(StructureStats {
-                    name: format!("light grid of veils {name}"),
-                    build: start.elapsed(),
-                    bytes: grid.bytes(),
-                    cells: grid.cell_count(),
-                    references: grid.reference_count(),
-                });
-                grid
+                stats.build(
+                    &format!("light grid of veils {name}"),
+                    || veils_before(plan, geometry, rules, options.level),
+                    |grid| [grid.bytes(), grid.cell_count(), grid.reference_count()],
+                )
             }));
         }
 
         let veils = rules.any_transparent().then(|| {
-            let start = Instant::now();
-            let veils = EyeVeils::build(view, triangles, |prim| rules.is_transparent(prim), options.level);
-            stats.push(StructureStats {
-                name: "eye veils".into(),
-                build: start.elapsed(),
-                bytes: veils.bytes(),
-                cells: veils.cell_count(),
-                references: veils.reference_count(),
-            });
-            veils
+            let is_veil = |prim| rules.is_transparent(prim);
+            stats.build(
+                "eye veils",
+                || EyeVeils::build(view, triangles, is_veil, options.level),
+                |veils| [veils.bytes(), veils.cell_count(), veils.reference_count()],
+            )
         });
         let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
         let layers = (soft && rules.any_transparent()).then(|| {
-            let start = Instant::now();
-            let bvh = Bvh::build(triangles);
-            stats.push(StructureStats {
-                name: "hierarchy behind transparent surfaces".into(),
-                build: start.elapsed(),
-                bytes: bvh.bytes(),
-                cells: 0,
-                references: bvh.stats().triangles,
-            });
-            bvh
+            stats.build(
+                "hierarchy behind transparent surfaces",
+                || Bvh::build(triangles),
+                |bvh| [bvh.bytes(), 0, bvh.stats().triangles],
+            )
         });
         Self {
             eye,
@@ -169,7 +136,7 @@ impl<'g> FrameStructures<'g> {
             veils,
             light_veils,
             layers,
-            stats,
+            stats: stats.0,
         }
     }
 
@@ -193,6 +160,44 @@ impl<'g> FrameStructures<'g> {
     pub(crate) fn seen(&self, tile: &Tile, x: u32, y: u32) -> Option<Option<u32>> {
         self.visibility.as_ref().map(|v| v.prim(tile.index, x, y))
     }
+}
+
+/// Structures built so far.
+#[derive(Default)]
+struct Timed(Vec<StructureStats>);
+
+impl Timed {
+    /// Builds one more; `size` is its bytes, cells and references.
+    fn build<T>(&mut self, name: &str, build: impl FnOnce() -> T, size: impl FnOnce(&T) -> [usize; 3]) -> T {
+        let start = Instant::now();
+        let built = build();
+        let [bytes, cells, references] = size(&built);
+        self.0.push(StructureStats {
+            name: name.into(),
+            build: start.elapsed(),
+            bytes,
+            cells,
+            references,
+        });
+        built
+    }
+}
+
+/// The grid of a light over masked and blended triangles.
+fn veils_before<'g>(
+    plan: &LightPlan,
+    geometry: &'g FrameGeometry,
+    rules: &CasterRules,
+    level: SimdLevel,
+) -> PointLightGrid<'g> {
+    let rule = |prim| {
+        if rules.is_transparent(prim) {
+            Casts::Both
+        } else {
+            Casts::Nothing
+        }
+    };
+    PointLightGrid::build(plan.light, triangles(geometry), &rule, plan.grid, level)
 }
 
 /// Builds what tells the shadows of one light.

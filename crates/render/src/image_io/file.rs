@@ -99,12 +99,49 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
         Ok(found) => kept = Some(found.permissions()),
         Err(_) => {}
     }
+    let begun = begin(target, kept)?;
+    let mut buffered = BufWriter::with_capacity(1 << 16, begun.file.as_file());
+    encode(&mut buffered)?;
+    buffered.flush()?;
+    drop(buffered);
+    begun.put_in_place(target)
+}
+
+/// As [`write`], for a file that another process fills: `make` gets the path of an empty file of the same ending.
+pub(super) fn write_by_path(path: &Path, make: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
+    let write = || {
+        let resolved = fs::canonicalize(path);
+        let target = resolved.as_deref().unwrap_or(path);
+        let kept = match fs::metadata(target) {
+            Ok(found) if !found.is_file() => return Err(io::Error::other("it is not a regular file")),
+            Ok(found) if found.permissions().readonly() => {
+                return Err(io::ErrorKind::PermissionDenied.into());
+            }
+            found => found.ok().map(|found| found.permissions()),
+        };
+        let begun = begin(target, kept)?;
+        make(begun.file.path())?;
+        begun.put_in_place(target)
+    };
+    write().map_err(|source| Error::write(path, source))
+}
+
+/// An empty temporary file beside its target, with the permissions that the target has or will have.
+fn begin(target: &Path, kept: Option<fs::Permissions>) -> io::Result<Begun> {
     let folder = match target.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
+    let ending = target.extension().map(|ending| {
+        let mut suffix = std::ffi::OsString::from(".");
+        suffix.push(ending);
+        suffix
+    });
     let mut builder = tempfile::Builder::new();
     builder.prefix(".rayward-");
+    if let Some(suffix) = &ending {
+        builder.suffix(suffix);
+    }
     #[cfg(unix)]
     {
         // The mode of any new file, reduced by the umask, instead of the private mode of temporary ones.
@@ -115,11 +152,7 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
     if let Some(permissions) = kept {
         begun.file.as_file().set_permissions(permissions)?;
     }
-    let mut buffered = BufWriter::with_capacity(1 << 16, begun.file.as_file());
-    encode(&mut buffered)?;
-    buffered.flush()?;
-    drop(buffered);
-    begun.put_in_place(target)
+    Ok(begun)
 }
 
 /// The whole content of a regular file; a pipe or a device may never end.

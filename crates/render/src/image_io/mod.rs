@@ -2,6 +2,8 @@
 //!
 //! | format | written | read | values |
 //! |---|---|---|---|
+//! | APNG, GIF | movies: 8 bit RGB, 256 colours | | sRGB encoded |
+//! | MP4, `WebM`, MKV | movies, by an installed `ffmpeg` | | sRGB encoded |
 //! | PNG | 8 bit RGB, tagged sRGB | 8 and 16 bit, all colour types | sRGB encoded |
 //! | JPEG | | 8 bit | sRGB encoded |
 //! | EXR | all layers of a film, f32 and u32, ZIP | R, G, B, A or Y of the first part that has them | linear |
@@ -15,6 +17,7 @@
 
 mod exr;
 mod file;
+mod movie;
 mod npy;
 mod pfm;
 mod picture;
@@ -22,6 +25,7 @@ mod png;
 
 pub use exr::{encode_exr, write_exr};
 pub use file::{Discarded, discard_unfinished};
+pub use movie::{MovieOptions, is_movie, write_movie};
 pub use npy::{encode_npy, write_npy};
 pub use picture::{Picture, read_picture, read_picture_up_to};
 pub use png::{encode_png, write_png};
