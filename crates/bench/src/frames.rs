@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::contender::{Contender, FrameKind, Job};
 use crate::embree::{self, Library, Quality};
 use crate::ours::{Rayward, tile_side};
-use crate::peers::{Obvhs, ObvhsTree};
+use crate::peers::{Obvhs, ObvhsTree, RegularGrid};
 use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, Times};
 
 /// Share of the pixels in which a picture may differ: rays of f32 peers through edges and along grazing surfaces.
@@ -30,6 +30,8 @@ pub struct FramesOptions {
     pub level: SimdLevel,
     /// Whether other ray tracers are measured too.
     pub peers: bool,
+    /// Whether our own regular grid is among them, ray by ray: slow.
+    pub regular_grid: bool,
 }
 
 impl Default for FramesOptions {
@@ -42,6 +44,7 @@ impl Default for FramesOptions {
             runs: 5,
             level: SimdLevel::detect(),
             peers: true,
+            regular_grid: false,
         }
     }
 }
@@ -118,7 +121,7 @@ impl FramesReport {
 }
 
 /// A contender that threads can share.
-type Drawer = dyn Contender + Send + Sync;
+type Drawer<'s> = dyn Contender + Send + Sync + 's;
 
 /// Gets every picture that is compared, with a name.
 pub type PictureSink<'p> = &'p mut (dyn FnMut(&str, &Picture) + Send);
@@ -164,13 +167,13 @@ pub fn measure(
     Ok(report)
 }
 
-fn contenders(
-    scene: &BenchScene,
+fn contenders<'s>(
+    scene: &'s BenchScene,
     options: &FramesOptions,
     libraries: &[Library],
-) -> Result<Vec<Box<Drawer>>> {
+) -> Result<Vec<Box<Drawer<'s>>>> {
     let triangles = scene.triangles();
-    let mut contenders: Vec<Box<Drawer>> = vec![Box::new(Rayward {
+    let mut contenders: Vec<Box<Drawer<'s>>> = vec![Box::new(Rayward {
         casters: CasterPolicy::Auto,
     })];
     if options.kinds.iter().any(|&kind| kind != FrameKind::Eye) {
@@ -181,6 +184,9 @@ fn contenders(
     if options.peers {
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Wide)));
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Binary)));
+    }
+    if options.regular_grid {
+        contenders.push(Box::new(RegularGrid::build(triangles)));
     }
     for library in libraries {
         for quality in Quality::ALL {

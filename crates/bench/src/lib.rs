@@ -8,14 +8,16 @@
 //! | what | module |
 //! |---|---|
 //! | frames of scenes, all contenders | [`frames`] |
-//! | cost against triangles, pixels, lights, threads | [`scaling`] |
+//! | cost against triangles, pixels, lights, samples, threads | [`scaling`] |
 //! | binning rate, and what a second thread brings | [`build`] |
+//! | the papers' tables and claims | [`tables`], [`steps`] |
 //!
 //! Times are of the whole process, as processor time and as wall time; where the system does not tell the
 //! former, it is the latter. Runs of all contenders are interleaved, and a figure is a median with its range. This
 //! crate prints nothing.
 
 pub mod build;
+pub mod claims;
 mod clock;
 pub mod contender;
 mod embree;
@@ -24,12 +26,15 @@ pub mod frames;
 mod machine;
 mod ours;
 mod packet;
+mod papers;
 mod peers;
 mod picture;
 pub mod scaling;
 mod scene;
 mod stats;
+pub mod steps;
 pub mod table;
+pub mod tables;
 
 pub use clock::{Stopwatch, Time};
 pub use contender::FrameKind;

@@ -131,12 +131,14 @@ impl Rayward {
             for (&place, bits) in work.places.iter().zip(bits) {
                 let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
                 let place = usize::from(place);
-                work.lit[place / BLOCK_LANES][place % BLOCK_LANES] = count as u8;
+                // The share of all samples as so many of the usual number.
+                let lit = count * SOFT_SAMPLES / job.samples.count();
+                work.lit[place / BLOCK_LANES][place % BLOCK_LANES] = lit as u8;
             }
             for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
                 darken(block, lit, SOFT_SAMPLES as u8);
             }
-            work.receivers.len() as u64 * u64::from(SOFT_SAMPLES)
+            work.receivers.len() as u64 * u64::from(job.samples.count())
         });
         tiles.sum()
     }

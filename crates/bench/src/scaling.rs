@@ -1,10 +1,10 @@
-//! What a ray costs against triangles, pixels, lights and threads: one curve for each, all else fixed.
+//! What a ray costs against triangles, pixels, lights, samples and threads: one curve for each, all else fixed.
 //!
 //! Frames are those of [`crate::frames`], Rayward alone, every structure rebuilt. A curve of a cost per ray that stays
 //! flat says that the structures keep up; one that rises says what they do not hide.
 
 use rayward::CasterPolicy;
-use rayward::trace::SimdLevel;
+use rayward::trace::{Samples, SimdLevel};
 use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
@@ -72,6 +72,7 @@ struct Sizes {
     blobs: &'static [u32],
     resolutions: &'static [[u32; 2]],
     lights: &'static [usize],
+    samples: &'static [u32],
     usual: [u32; 2],
 }
 
@@ -79,6 +80,7 @@ const FULL: Sizes = Sizes {
     blobs: &[7, 22, 71, 224, 707],
     resolutions: &[[640, 400], [1280, 800], [1920, 1200], [3840, 2160], [7680, 4320]],
     lights: &[1, 4, 16, 64],
+    samples: &[1, 4, 16, 64, 256],
     usual: [1920, 1200],
 };
 
@@ -86,6 +88,7 @@ const QUICK: Sizes = Sizes {
     blobs: &[7, 22],
     resolutions: &[[64, 40], [128, 80]],
     lights: &[1, 2],
+    samples: &[1, 16],
     usual: [96, 60],
 };
 
@@ -123,6 +126,18 @@ pub fn measure(options: &ScalingOptions, progress: &mut dyn FnMut(&str)) -> Resu
         parameter: "lights",
         scene: SCENE.into(),
         frame: FrameKind::EyeHard.name(),
+        points: points.collect::<Result<_>>()?,
+    });
+    let points = sizes.samples.iter().map(|&samples| {
+        progress(&format!("samples {samples}"));
+        let mut soft = Job::new(&scene, sizes.usual, FrameKind::EyeSoft, options.level)?;
+        soft.samples = Samples::new(samples, 1);
+        one_thread(options, &soft, u64::from(samples), 1)
+    });
+    curves.push(Curve {
+        parameter: "samples",
+        scene: SCENE.into(),
+        frame: "eye+soft",
         points: points.collect::<Result<_>>()?,
     });
     let points = (1..=options.threads).map(|threads| {

@@ -184,6 +184,18 @@ impl BenchScene {
         (0..number).map(around).collect()
     }
 
+    /// Moves the camera back to so many times its distance from the middle of the scene.
+    pub(crate) fn step_back(&mut self, times: f64) {
+        let (low, high) = self.geometry.bounds().unwrap_or_default();
+        let middle = self.geometry.origin + (low + high).as_dvec3() * 0.5;
+        self.camera.eye = middle + (self.camera.eye - middle) * times;
+    }
+
+    /// Turns the camera around, so that it sees nothing of what was before it.
+    pub(crate) fn turn_away(&mut self) {
+        self.camera.forward = -self.camera.forward;
+    }
+
     fn local(&self, point: DVec3) -> Vec3 {
         (point - self.geometry.origin).as_vec3()
     }

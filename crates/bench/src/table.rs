@@ -1,8 +1,11 @@
 //! Reports as text for people, and as rows for spreadsheets.
 
 use crate::build::{BuildReport, Scaled, SceneBuilds};
+use crate::claims::Verdict;
 use crate::frames::{FrameReport, FramesReport};
 use crate::scaling::ScalingReport;
+use crate::steps::StepReport;
+use crate::tables::TablesReport;
 use crate::{Machine, Spread};
 
 /// A table whose columns are as wide as they need to be; the first is aligned to the left, the others to the right.
@@ -347,6 +350,136 @@ pub fn build_csv(report: &BuildReport) -> String {
         }
     }
     table.csv()
+}
+
+/// The papers' tables for people.
+pub fn tables(report: &TablesReport) -> String {
+    let [width, height] = report.size;
+    let mut text = machine(&report.machine);
+    text += &format!(
+        "medians of {} runs, wall time, everything of ours rebuilt in every frame; HM08's figures are of one core of 2006\n\n\
+         HM08, Table 1, {width}x{height}\n",
+        report.runs
+    );
+    text += &frame_lines(report).text();
+    let mut table = Table::new(&[
+        "scene",
+        "frame",
+        "fps",
+        "x regular grid",
+        "paper",
+        "x hierarchy, rebuilt",
+        "paper",
+        "x hierarchy, prebuilt",
+        "paper",
+        "fastest hierarchy",
+    ]);
+    for line in &report.peers {
+        let over = |other: Option<f64>| optional(other.map(|other| line.fps / other));
+        let [grid, rebuilt, prebuilt] = line.paper_ratios.map(optional);
+        table.row(vec![
+            line.scene.clone(),
+            line.frame.into(),
+            number(line.fps),
+            over(line.grid_fps),
+            grid,
+            over(line.rebuilt_fps),
+            rebuilt,
+            over(line.prebuilt_fps),
+            prebuilt,
+            line.fastest.clone().unwrap_or_else(|| "-".into()),
+        ]);
+    }
+    text += &format!("\nHM08, Tables 2 and 3, square pictures\n{}", table.text());
+    let raster = &report.raster;
+    text += &format!(
+        "\nHM08, Table 4, {}\n{} million triangles a second with {:.1} % of the window covered (paper: {}), {} million \
+         vertices a second out of sight (paper: {})\n",
+        raster.scene,
+        number(raster.mtriangles_per_s[0]),
+        raster.covered * 100.0,
+        raster.mtriangles_per_s[1],
+        number(raster.mvertices_per_s[0]),
+        raster.mvertices_per_s[1]
+    );
+    text += &format!("\n{}\nHM08, claims\n", steps(&report.steps));
+    for claim in &report.claims {
+        let verdict = match claim.verdict {
+            Verdict::Exceeded => "exceeded    ",
+            Verdict::Reproduced => "reproduced  ",
+            Verdict::Not => "NOT         ",
+            Verdict::NotMeasured => "not measured",
+        };
+        text += &format!("{verdict}  {}: {}\n", claim.claim, claim.figures);
+    }
+    text
+}
+
+fn steps(report: &StepReport) -> String {
+    let mut table = Table::new(&["grid", "cells", "cells a ray", "tests a ray", "references"]);
+    for grid in &report.grids {
+        let [x, y, z] = grid.cells;
+        table.row(vec![
+            if grid.perspective {
+                "perspective"
+            } else {
+                "regular"
+            }
+            .into(),
+            format!("{x}x{y}x{z}"),
+            number(grid.steps),
+            number(grid.tests),
+            grid.references.to_string(),
+        ]);
+    }
+    format!(
+        "HM08, Table 5, {}, {} shadow rays, {:.0} % of them in shadow; the paper has 52.0 and 12.7\n{}",
+        report.scene,
+        report.rays,
+        report.in_shadow * 100.0,
+        table.text()
+    )
+}
+
+/// Table 1.
+fn frame_lines(report: &TablesReport) -> Table {
+    let threads = format!("fps, {} threads", report.machine.threads);
+    let mut table = Table::new(&[
+        "scene",
+        "stands for",
+        "triangles",
+        "frame",
+        "fps",
+        "paper",
+        "x paper",
+        &threads,
+        "Mray/s",
+        "paper",
+        "build %",
+        "paper",
+    ]);
+    for line in &report.frames {
+        table.row(vec![
+            line.scene.clone(),
+            format!("{}, {}k", line.paper_scene, line.paper_ktriangles),
+            line.triangles.to_string(),
+            line.frame.into(),
+            number(line.fps),
+            number(line.paper_fps),
+            number(line.fps / line.paper_fps),
+            number(line.fps_parallel),
+            number(line.mray_per_s),
+            number(line.paper_mray_per_s),
+            number(line.build * 100.0),
+            number(line.paper_build * 100.0),
+        ]);
+    }
+    table
+}
+
+/// Table 1 as comma-separated values, one line a frame.
+pub fn tables_csv(report: &TablesReport) -> String {
+    frame_lines(report).csv()
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use rayward::trace::SimdLevel;
 use rayward_bench::build::{self, BuildOptions};
 use rayward_bench::frames::{self, FramesOptions, FramesReport};
 use rayward_bench::scaling::{self, ScalingOptions};
+use rayward_bench::tables::{self, TablesOptions};
 use rayward_bench::{BenchScene, FrameKind, Picture, table};
 
 use crate::failure::{Code, Failure};
@@ -24,7 +25,8 @@ Examples:
   rayward bench frames blob-69k model.glb --frames eye --runs 9
   rayward bench frames --json > frames.json
   rayward bench scaling --quick
-  rayward bench build courtyard";
+  rayward bench build courtyard
+  rayward bench tables";
 
 /// `rayward bench`
 #[derive(Debug, Args)]
@@ -38,10 +40,12 @@ pub(crate) struct BenchArgs {
 enum What {
     /// Whole frames of scenes, beside other ray tracers; exit code 5 if pictures differ
     Frames(FramesArgs),
-    /// What a ray costs against triangles, pixels, lights and threads
+    /// What a ray costs against triangles, pixels, lights, samples and threads
     Scaling(ScalingArgs),
     /// Builds alone, and what further threads bring
     Build(BuildArgs),
+    /// The tables and claims of Hunt and Mark's paper, with our figures beside theirs
+    Tables(TablesArgs),
 }
 
 /// `rayward bench frames`
@@ -92,6 +96,19 @@ struct BuildArgs {
     /// Worker threads that one is compared with
     #[arg(long, value_name = "NUMBER", default_value_t = 2, value_parser = threads())]
     threads: u32,
+    #[command(flatten)]
+    run: MeasureArgs,
+}
+
+/// `rayward bench tables`
+#[derive(Debug, Args)]
+struct TablesArgs {
+    /// Width and height of Table 1's pictures; the others are square
+    #[arg(long, value_name = "WxH", value_parser = values::size, default_value = "1920x1200")]
+    resolution: Size,
+    /// Worker threads of the parallel columns; one for each core unless given
+    #[arg(long, value_name = "NUMBER", value_parser = threads())]
+    threads: Option<u32>,
     #[command(flatten)]
     run: MeasureArgs,
 }
@@ -147,6 +164,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
         What::Frames(args) => run_frames(args),
         What::Scaling(args) => run_scaling(args),
         What::Build(args) => run_build(args),
+        What::Tables(args) => run_tables(args),
     }
 }
 
@@ -194,10 +212,9 @@ fn run_frames(args: &FramesArgs) -> Result<(), Failure> {
 }
 
 fn run_scaling(args: &ScalingArgs) -> Result<(), Failure> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let options = ScalingOptions {
         quick: args.quick,
-        threads: args.threads.map_or(cores, |threads| threads as usize),
+        threads: args.threads.map_or_else(cores, |threads| threads as usize),
         runs: args.run.runs as usize,
         level: SimdLevel::detect(),
     };
@@ -228,11 +245,37 @@ fn run_build(args: &BuildArgs) -> Result<(), Failure> {
     )
 }
 
+fn run_tables(args: &TablesArgs) -> Result<(), Failure> {
+    let options = TablesOptions {
+        size: [args.resolution.width, args.resolution.height],
+        threads: args.threads.map_or_else(cores, |threads| threads as usize),
+        runs: args.run.runs as usize,
+        level: SimdLevel::detect(),
+        folder: folder(),
+    };
+    let measured = tables::measure(&options, &mut |what| args.run.progress(what))?;
+    tell(
+        &args.run,
+        &measured,
+        table::tables(&measured),
+        table::tables_csv(&measured),
+    )
+}
+
+fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// The folder of further scenes.
+fn folder() -> Option<PathBuf> {
+    std::env::var_os("RAYWARD_SCENES")
+        .filter(|folder| !folder.is_empty())
+        .map(PathBuf::from)
+}
+
 /// The scenes of these names, or all.
 fn load(names: &[String], args: &MeasureArgs) -> Result<Vec<BenchScene>, Failure> {
-    let folder = std::env::var_os("RAYWARD_SCENES")
-        .filter(|folder| !folder.is_empty())
-        .map(PathBuf::from);
+    let folder = folder();
     let names: Vec<&str> = match names {
         [] => rayward_bench::all_scenes(folder.is_some()).collect(),
         names => names.iter().map(String::as_str).collect(),

@@ -4,6 +4,7 @@
 //! its length, as is usual where hits are not exact.
 
 mod obvhs;
+mod regular;
 
 use rayon::prelude::*;
 use rayward::trace::{BLOCK_LANES, Facets, HitBlocks, Light, View, darken};
@@ -13,6 +14,7 @@ use crate::packet::{LANES, Lanes, NOTHING, Packet, Rays, Valid};
 use crate::{Picture, Time};
 
 pub(crate) use obvhs::{Obvhs, ObvhsTree};
+pub(crate) use regular::RegularGrid;
 
 /// Share of a shadow ray that is cut off at both of its ends.
 const CUT: f32 = 1e-4;

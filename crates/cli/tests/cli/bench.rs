@@ -1,6 +1,6 @@
 //! `rayward bench` at tiny sizes: counts, pictures and the form of the reports. No time is looked at.
 
-use crate::support::Folder;
+use crate::support::{Folder, Run};
 
 const TINY: [&str; 4] = ["--resolution", "96x60", "--runs", "1"];
 
@@ -103,6 +103,7 @@ fn scaling_and_builds_count_what_they_measure() {
             "triangles",
             "pixels",
             "lights",
+            "samples",
             "threads"
         ]
     );
@@ -112,7 +113,9 @@ fn scaling_and_builds_count_what_they_measure() {
     assert_eq!(points(1)[0]["rays"], 64 * 40);
     let rays = |point: usize| points(6)[point]["rays"].as_u64().expect("a number") - 96 * 60;
     assert!(rays(0) > 0 && rays(1) > rays(0), "shadow rays for each light");
-    assert_eq!(points(7).len(), 2);
+    let rays = |point: usize| points(7)[point]["rays"].as_u64().expect("a number") - 96 * 60;
+    assert_eq!(rays(1), 16 * rays(0));
+    assert_eq!(points(8).len(), 2);
 
     let arguments = [&["bench", "build", "blob-4k", "--json", "-q"][..], &TINY].concat();
     let report = folder.run(&arguments).expect(0).json();
@@ -125,6 +128,35 @@ fn scaling_and_builds_count_what_they_measure() {
     for piece in ["eye_grid", "binning", "shadows", "frame"] {
         assert!(scene[piece]["speed_up"].is_number(), "{piece}");
     }
+}
+
+#[test]
+fn tables_have_all_rows_of_the_paper() {
+    let folder = Folder::new();
+    let arguments = [&["bench", "tables", "--json", "-q", "--threads", "2"][..], &TINY].concat();
+    let output = folder.command(&arguments).env_remove("RAYWARD_SCENES").output();
+    let report = Run::from(output.expect("the program runs")).expect(0).json();
+    let lines = |name: &str| report[name].as_array().expect("lines").clone();
+    assert_eq!(lines("frames").len(), 9 * 3);
+    for line in lines("frames") {
+        assert!(line["fps"].as_f64().is_some_and(|fps| fps > 0.0), "{line}");
+        assert_eq!(
+            line["untested"].is_number(),
+            line["frame"] == "eye+hard",
+            "{line}"
+        );
+    }
+    assert_eq!(lines("peers").len(), 6);
+    for line in lines("peers") {
+        assert!(
+            line["grid_fps"].is_number() && line["prebuilt_fps"].is_number(),
+            "{line}"
+        );
+    }
+    let covered = report["raster"]["covered"].as_f64().expect("a share");
+    assert!((0.04..0.06).contains(&covered), "{covered}");
+    assert_eq!(report["steps"]["same_answers"], true);
+    assert_eq!(lines("claims").len(), 12);
 }
 
 #[test]
