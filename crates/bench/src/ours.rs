@@ -98,7 +98,13 @@ impl Rayward {
                 eye: Light::Point(job.view.center),
                 rule,
             };
-            LitPixels::find(visibility, &job.scene.triangles(), &query, job.level)
+            LitPixels::find(
+                visibility,
+                &job.scene.triangles(),
+                &job.scene.clusters,
+                &query,
+                job.level,
+            )
         })
     }
 

@@ -214,7 +214,7 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
             let options = EyeGridOptions::default();
             let grid = EyeGrid::build_clustered(view, triangles, &frame.clusters, options, level);
             let visibility = Visibility::trace(&grid, &|| ());
-            LitPixels::find(&visibility, &triangles, &query, level)
+            LitPixels::find(&visibility, &triangles, &frame.clusters, &query, level)
         };
         let counts = run().counts;
         if !is_test() {

@@ -96,7 +96,7 @@ impl<'g> FrameStructures<'g> {
             let shadows = shadows_of(
                 plan,
                 visibility.as_ref(),
-                geometry,
+                (geometry, clusters),
                 rules,
                 eye_point,
                 options.level,
@@ -204,7 +204,7 @@ fn veils_before<'g>(
 fn shadows_of<'g>(
     plan: &LightPlan,
     visibility: Option<&Visibility>,
-    geometry: &'g FrameGeometry,
+    (geometry, clusters): (&'g FrameGeometry, &Clusters),
     rules: &CasterRules,
     eye: Light,
     level: SimdLevel,
@@ -223,7 +223,7 @@ fn shadows_of<'g>(
                 eye,
                 rule: &rule,
             };
-            LightShadows::Pixels(LitPixels::find(visibility, &triangles, &query, level))
+            LightShadows::Pixels(LitPixels::find(visibility, &triangles, clusters, &query, level))
         }
         None => LightShadows::Grid(PointLightGrid::build(
             plan.light, triangles, &rule, plan.grid, level,

@@ -21,8 +21,10 @@ const _: () = assert!(3 * CLUSTER <= 256);
 /// Groups of up to 64 triangles that lie together.
 #[derive(Clone, Debug, Default)]
 pub struct Clusters {
-    /// Triangles in all, those left out included.
+    /// Triangles in all.
     triangles: usize,
+    /// Clusters before those of copies.
+    distinct: usize,
     /// Of each cluster the first entry of `prims` and of `vertices`, and where the last ends.
     starts: Vec<[u32; 2]>,
     prims: Vec<u32>,
@@ -58,42 +60,59 @@ impl Clusters {
         // Of several triangles with the same corners in the same order the first is always the closest.
         let mut prims: Vec<u32> = (0..triangles.len() as u32).filter(|&prim| keep(prim)).collect();
         prims.sort_unstable_by_key(|&p| (triangles.indices[p as usize], p));
-        prims.dedup_by_key(|p| triangles.indices[*p as usize]);
-        let mut counts = Vec::new();
-        halve(&centroids, &mut prims, &mut counts);
+        let mut copies = Vec::new();
+        prims.dedup_by(|later, first| {
+            let copy = triangles.indices[*later as usize] == triangles.indices[*first as usize];
+            if copy {
+                copies.push(*later);
+            }
+            copy
+        });
         let mut clusters = Self {
             triangles: triangles.len(),
             starts: vec![[0, 0]],
-            corners: Vec::with_capacity(prims.len()),
+            corners: Vec::with_capacity(triangles.len()),
             ..Self::default()
         };
+        clusters.add(triangles, &centroids, prims);
+        clusters.distinct = clusters.len_with_copies();
+        clusters.add(triangles, &centroids, copies);
+        clusters
+    }
+
+    /// Groups these triangles.
+    fn add(&mut self, triangles: &Triangles, centroids: &[Vec3], mut prims: Vec<u32>) {
+        let mut counts = Vec::new();
+        halve(centroids, &mut prims, &mut counts);
         let mut rest = prims.as_mut_slice();
         for count in counts {
             let (group, later) = rest.split_at_mut(count);
             rest = later;
             group.sort_unstable();
-            let first = clusters.vertices.len();
-            clusters
-                .vertices
-                .extend(group.iter().flat_map(|&p| triangles.indices[p as usize]));
-            clusters.vertices[first..].sort_unstable();
-            let mut own = clusters.vertices.split_off(first);
+            let mut own: Vec<u32> = group
+                .iter()
+                .flat_map(|&p| triangles.indices[p as usize])
+                .collect();
+            own.sort_unstable();
             own.dedup();
             let place = |v: u32| own.partition_point(|&o| o < v) as u8;
-            clusters
-                .corners
+            self.corners
                 .extend(group.iter().map(|&p| triangles.indices[p as usize].map(place)));
-            clusters.vertices.append(&mut own);
-            clusters
-                .starts
-                .push([clusters.corners.len() as u32, clusters.vertices.len() as u32]);
+            self.vertices.append(&mut own);
+            self.starts
+                .push([self.corners.len() as u32, self.vertices.len() as u32]);
         }
-        clusters.prims = prims;
-        clusters
+        self.prims.append(&mut prims);
     }
 
-    /// Number of clusters.
+    /// Number of clusters, without those of copies: triangles with the corners of one before them, in the same order,
+    /// which a ray never sees.
     pub fn len(&self) -> usize {
+        self.distinct
+    }
+
+    /// Number of all clusters; those of copies come last.
+    pub(crate) fn len_with_copies(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
@@ -231,6 +250,10 @@ mod tests {
             }
             let (kept, left_out) = seen.split_at(seen.len() - copies);
             assert!(kept.iter().all(|&n| n == 1) && left_out.iter().all(|&n| n == 0));
+            let of_copies = (clusters.len()..clusters.len_with_copies()).map(|i| clusters.cluster(i));
+            let copied: Vec<u32> = of_copies.flat_map(|c| c.prims).copied().collect();
+            let last = triangles.len() as u32;
+            assert_eq!(copied, (last - copies as u32..last).collect::<Vec<_>>());
         }
     }
 

@@ -150,7 +150,7 @@ impl<'a> PointLightGrid<'a> {
             faces: Vec::new(),
             unprojected: Vec::new(),
         };
-        if let Some(faces) = crate::light_views::views(&light, &triangles, options.cone) {
+        if let Some(faces) = crate::light_views::views(&light, &triangles, options.cone, None) {
             let face = |view| Face::build(view, &light, &triangles, rule, &options, level);
             grid.faces = faces.views.into_iter().map(face).collect();
         } else {

@@ -34,9 +34,15 @@ const LARGEST: f64 = 1e30;
 const WIDEST_CONE: f64 = 1.5;
 
 /// The views of a light onto these triangles; none where there is nothing to see, or where the light has no
-/// finite position or direction. `None` if the geometry is too large to be projected.
-pub(crate) fn views(light: &Light, triangles: &Triangles, cone: Option<Cone>) -> Option<LightFaces> {
-    let Some(bounds) = Bounds::of(triangles) else {
+/// finite position or direction. `None` if the geometry is too large to be projected. `extent` is a box around all
+/// triangles, if one is known that is finite.
+pub(crate) fn views(
+    light: &Light,
+    triangles: &Triangles,
+    cone: Option<Cone>,
+    extent: Option<[Vec3; 2]>,
+) -> Option<LightFaces> {
+    let Some(bounds) = extent.map_or_else(|| Bounds::of(triangles), |b| Some(Bounds::enlarged(b))) else {
         return Some(LightFaces::default());
     };
     if bounds.min.abs().max(bounds.max.abs()).max_element() > LARGEST {
@@ -135,14 +141,20 @@ impl Bounds {
         if triangles.is_empty() || axes.iter().any(|(low, high)| low > high) {
             return None;
         }
-        let min = Vec3::from(axes.map(|a| a.0)).as_dvec3();
-        let max = Vec3::from(axes.map(|a| a.1)).as_dvec3();
+        Some(Self::enlarged([
+            Vec3::from(axes.map(|a| a.0)),
+            Vec3::from(axes.map(|a| a.1)),
+        ]))
+    }
+
+    fn enlarged(range: [Vec3; 2]) -> Self {
+        let [min, max] = range.map(Vec3::as_dvec3);
         let largest = min.abs().max(max.abs()).max_element();
         let slack = DVec3::splat((max - min).length() * 1e-3 + largest * 1e-6 + 1e-30);
-        Some(Self {
+        Self {
             min: min - slack,
             max: max + slack,
-        })
+        }
     }
 
     fn middle(&self) -> DVec3 {

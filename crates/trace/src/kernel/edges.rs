@@ -87,6 +87,19 @@ impl VertexLanes {
         self.prim[lane] = prim;
         self.count += 1;
     }
+
+    /// As [`Self::push`], from x, y and nearness of the three corners.
+    #[inline(always)]
+    pub(crate) fn push_lanes(&mut self, prim: u32, x: [f32; 3], y: [f32; 3], nearness: [f32; 3]) {
+        let lane = self.count;
+        for corner in 0..3 {
+            self.x[corner][lane] = x[corner];
+            self.y[corner][lane] = y[corner];
+            self.nearness[corner][lane] = nearness[corner];
+        }
+        self.prim[lane] = prim;
+        self.count += 1;
+    }
 }
 
 /// Records of the lanes, and a bit for every lane whose record is good.

@@ -11,7 +11,7 @@ use glam::{DVec3, Vec3, Vec3Swizzles};
 
 use super::project::project_half;
 use super::tile::{BLOCK, NONE};
-use super::{LANES, SimdLevel};
+use super::{LANES, SimdLevel, bits_of};
 use crate::view::{Arrangement, View};
 
 /// Lanes of f64 in half a block: two rows of four pixels.
@@ -252,29 +252,40 @@ pub(crate) struct LightFaces {
     pub(crate) cube: Option<[Option<u32>; 6]>,
 }
 
-/// Sixteen receivers as a light sees them.
+/// Sixteen receivers as a light sees them. 264 bytes.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)]
 pub(crate) struct BlockPoints {
     pub(crate) x: [f32; LANES],
     pub(crate) y: [f32; LANES],
     pub(crate) nearness: [f32; LANES],
-    /// Block of the eye's tile.
+    /// The triangle that each lies on.
+    pub(crate) prims: [u32; LANES],
+    /// The eye's tile.
+    pub(crate) eye_tile: u32,
+    /// Block of that tile.
     pub(crate) block: u32,
 }
 
-/// Receivers of a block in one light tile.
+/// Receivers of a block that lie together in one light tile. 44 bytes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Entry {
     /// Light tile, counted through all faces.
     pub(crate) light_tile: u32,
-    /// The eye's tile.
-    pub(crate) eye_tile: u32,
-    /// Position of the block's points in that tile's list.
-    pub(crate) points: u16,
+    /// Position of the block's points among those of its part of the eye's tiles.
+    pub(crate) points: u32,
+    /// That part.
+    pub(crate) part: u16,
     /// A bit for each receiver.
     pub(crate) lanes: u16,
-    /// The smallest nearness of them.
+    /// The triangle that all of them lie on; [`NONE`] if there are several.
+    pub(crate) own: u32,
+    /// Rectangle of them, from the light tile's corner.
+    pub(crate) min: [f32; 2],
+    pub(crate) max: [f32; 2],
+    /// Smallest and largest nearness of them.
     pub(crate) farthest: f32,
+    pub(crate) nearest: f32,
 }
 
 /// Side of a light tile in units of the face's raster.
@@ -284,6 +295,10 @@ pub(crate) const LIGHT_TILE: u32 = 64;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Asking<'a> {
     pub(crate) eye_tile: u32,
+    /// The part of the eye's tiles that this one belongs to.
+    pub(crate) part: u16,
+    /// What each pixel sees, block by block.
+    pub(crate) prims: &'a [[u32; LANES]],
     pub(crate) rays: &'a TileRays,
     /// Hit parameters, block by block.
     pub(crate) t: &'a [[f64; LANES]],
@@ -311,12 +326,7 @@ fn project_receivers_impl<S: Simd>(
     points: &mut Vec<BlockPoints>,
     entries: &mut Vec<Entry>,
 ) {
-    let Asking {
-        eye_tile,
-        rays,
-        t,
-        pixels,
-    } = *asking;
+    let Asking { rays, t, pixels, .. } = *asking;
     for (block, &asked) in pixels.iter().enumerate() {
         if asked == 0 {
             continue;
@@ -330,8 +340,8 @@ fn project_receivers_impl<S: Simd>(
         for (face, lanes) in of_face.into_iter().enumerate().filter(|f| f.1 != 0) {
             let view = &faces.views[face];
             let projected = project_block(simd, view, &halves);
-            let place = (view, face as u32, eye_tile);
-            sort_block(simd, place, block, lanes, projected, points, entries);
+            let place = (view, face as u32, block);
+            sort_block(simd, asking, place, lanes, projected, points, entries);
         }
     }
 }
@@ -415,12 +425,16 @@ fn tile_index<S: Simd>(simd: S, v: f32x16<S>, tiles: u32) -> u32x16<S> {
     kept.to_int::<u32x16<S>>()
 }
 
+/// How far from each other the receivers of an entry may lie on either axis, in units of the face's raster: a block that
+/// shows an edge of something has receivers far apart.
+const TOGETHER: f32 = 6.0;
+
 /// Puts the points of a block into the light tiles of one face.
 #[inline(always)]
 fn sort_block<S: Simd>(
     simd: S,
-    (view, face, eye_tile): (&View, u32, u32),
-    block: usize,
+    asking: &Asking,
+    (view, face, block): (&View, u32, usize),
     asked: u32,
     [x, y, nearness]: [f32x16<S>; 3],
     points: &mut Vec<BlockPoints>,
@@ -429,7 +443,7 @@ fn sort_block<S: Simd>(
     // Elsewhere no caster can come before a point.
     let ahead = nearness.simd_gt(f32x16::splat(simd, 0.0));
     let seen = within(simd, x, view.width) & within(simd, y, view.height) & ahead;
-    let mut left = seen.to_bitmask() as u32 & asked;
+    let mut left = bits_of(simd, seen) & asked;
     if left == 0 {
         return;
     }
@@ -437,29 +451,48 @@ fn sort_block<S: Simd>(
     let column = tile_index(simd, x, tiles[0]);
     let row = tile_index(simd, y, tiles[1]);
     let tile = row * tiles[0] + column;
-    let position = points.len() as u16;
+    let position = points.len() as u32;
     let side = f32x16::splat(simd, LIGHT_TILE as f32);
-    points.push(BlockPoints {
-        x: (x - column.to_float::<f32x16<S>>() * side).into(),
-        y: (y - row.to_float::<f32x16<S>>() * side).into(),
+    let x = x - column.to_float::<f32x16<S>>() * side;
+    let y = y - row.to_float::<f32x16<S>>() * side;
+    let prims = &asking.prims[block];
+    let at = BlockPoints {
+        x: x.into(),
+        y: y.into(),
         nearness: nearness.into(),
+        prims: *prims,
+        eye_tile: asking.eye_tile,
         block: block as u32,
-    });
+    };
     let tile_of = <[u32; LANES]>::from(tile);
+    let seen_prims = u32x16::from_slice(simd, prims);
+    let reach = f32x16::splat(simd, TOGETHER);
     while left != 0 {
-        let first = tile_of[left.trailing_zeros() as usize];
-        let same = tile.simd_eq(u32x16::splat(simd, first)).to_bitmask() as u32 & left;
+        let first = left.trailing_zeros() as usize;
+        let near_x = (x - f32x16::splat(simd, at.x[first])).abs().simd_le(reach);
+        let near_y = (y - f32x16::splat(simd, at.y[first])).abs().simd_le(reach);
+        let same = tile.simd_eq(u32x16::splat(simd, tile_of[first])) & near_x & near_y;
+        let same = bits_of(simd, same) & left;
         left &= !same;
         let lanes = mask32x16::from_bitmask(simd, u64::from(same));
-        let farthest = lanes
-            .select(nearness, f32x16::splat(simd, f32::INFINITY))
-            .reduce_min();
+        let own = bits_of(simd, seen_prims.simd_eq(u32x16::splat(simd, prims[first])));
         entries.push(Entry {
-            light_tile: face * tiles[0] * tiles[1] + first,
-            eye_tile,
+            light_tile: face * tiles[0] * tiles[1] + tile_of[first],
             points: position,
+            part: asking.part,
             lanes: same as u16,
-            farthest,
+            own: if same & !own == 0 { prims[first] } else { NONE },
+            min: [least(simd, lanes, x), least(simd, lanes, y)],
+            max: [-least(simd, lanes, -x), -least(simd, lanes, -y)],
+            farthest: least(simd, lanes, nearness),
+            nearest: -least(simd, lanes, -nearness),
         });
     }
+    points.push(at);
+}
+
+/// The least value among these lanes.
+#[inline(always)]
+fn least<S: Simd>(simd: S, lanes: mask32x16<S>, v: f32x16<S>) -> f32 {
+    lanes.select(v, f32x16::splat(simd, f32::INFINITY)).reduce_min()
 }

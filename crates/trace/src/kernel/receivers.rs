@@ -1,194 +1,247 @@
-//! The receivers of one light tile, sorted by cell, and casters drawn over them in object order: hard shadows the
+//! The receivers of one light tile in a hierarchy of boxes, and casters drawn over them in object order: hard shadows the
 //! way of an irregular Z-buffer (Aila and Laine 2004; Johnson et al. 2005), sixteen lanes at a time.
 //!
-//! Cells lie in blocks of 4 x 4, as pixels do in the eye's tiles: cell (x, y) of a block is lane `y * 4 + x`. The receivers of a cell
-//! fill whole groups of sixteen. A caster is first held against the sixteen cells of a block: where may it reach
-//! into a cell, and is it before the cell's farthest receiver? Then against the groups of the cells that are left.
+//! Receivers stay in the blocks of 4 x 4 pixels that the eye sees them in, for what is close together there is as a rule close
+//! together in the light's raster: an *entry* is what of a block lies together. Entries are put in order along a Morton
+//! curve, and sixteen successive ones make a node with a box each; sixteen nodes make a node above them, up to one. A
+//! caster is held against the sixteen boxes of a node: may it reach into a box, before the box's farthest receiver? Where
+//! it covers a box before the nearest receiver all of that box is dark. In the end it is held against the receivers of
+//! those entries that are left, and an entry that is dark is not looked at again.
 //!
-//! Layout: 16 bytes a receiver, groups half empty at worst; 8 bytes a cell. Cost: about 30 vector instructions a caster
-//! and block of cells, 25 a caster and group.
+//! Layout: 16 bytes an entry and 34 bytes for its place in a node. Cost: about 60 ns an entry to put in order, 35 vector
+//! instructions a caster and node, 25 a caster and entry.
 
-use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
 use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
 use super::pixels::{BlockPoints, Entry, LIGHT_TILE};
-use super::{LANES, NEARNESS_BAND, SimdLevel};
+use super::tile::NONE;
+use super::{LANES, NEARNESS_BAND, SimdLevel, bits_of, max3, min3};
 
-/// Cells of a block in each direction.
-const BLOCK: u32 = 4;
+/// Columns and rows of the cells that the Morton curve passes.
+const CURVE_SIDE: u32 = 32;
 
-/// Lanes without a receiver.
-const NOBODY: u32 = u32::MAX;
-
-/// Receivers a cell is to have about; more make more pairs that do not meet, fewer leave lanes empty.
-const RECEIVERS_A_CELL: usize = 24;
-
-/// Smallest and largest number of blocks of cells in each direction of a light tile. A cell is at most four raster units
-/// wide, for no farther outside of its rectangle a triangle's edges are known.
-const BLOCKS: [u32; 2] = [4, 16];
+/// Levels of nodes at most: sixteen to this power are more entries than a frame has blocks.
+const LEVELS: usize = 6;
 
 /// A light tile's receivers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ReceiverTile {
-    /// Raster units per side of a cell.
-    side: f32,
-    /// Blocks of cells in a row.
-    blocks: u32,
-    /// First group of every cell, and the end.
-    starts: Vec<u32>,
-    /// Per block of cells, the nearness of each cell's farthest receiver; infinite if nobody asks there any more.
-    farthest: Vec<[f32; LANES]>,
-    groups: Vec<Group>,
-    /// Cells of the receivers, entry by entry, while they are sorted.
-    cells: Vec<[u32; LANES]>,
-    /// The nearness of the farthest receiver of all.
+    held: Vec<Held>,
+    /// Level by level, from those whose lanes are entries to the one on top.
+    nodes: Vec<Node>,
+    /// Where each level starts among the nodes.
+    levels: Vec<usize>,
+    /// Of every cell of the curve where its entries go.
+    next: Vec<u32>,
+    /// Rectangle of all, and the nearness of the farthest.
+    min: [f32; 2],
+    max: [f32; 2],
     least: f32,
-    /// Pairs of group, lane and triangle that f32 could not tell.
+    /// Smaller casters cover no box.
+    mean_side: f32,
+    /// Triples of entry, lane and triangle that f32 could not tell.
     pub(crate) unsure: Vec<(u32, u32, u32)>,
 }
 
-/// Up to sixteen receivers of a cell.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Group {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    nearness: [f32; LANES],
-    /// Entry times sixteen plus lane.
-    pub(crate) id: [u32; LANES],
-    /// A bit for each receiver that is not in shadow yet.
-    pub(crate) open: u32,
+/// The receivers of an entry.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Held {
+    /// Where its points are.
+    part: u16,
+    points: u32,
     /// A bit for each receiver.
-    pub(crate) all: u32,
+    pub(crate) all: u16,
+    /// A bit for each receiver that is not in shadow yet.
+    pub(crate) open: u16,
     /// Whether a caster was held against it.
     pub(crate) tested: bool,
 }
 
-const EMPTY: Group = Group {
-    x: [0.0; LANES],
-    y: [0.0; LANES],
-    nearness: [f32::INFINITY; LANES],
-    id: [NOBODY; LANES],
-    open: 0,
-    all: 0,
-    tested: false,
-};
+/// Sixteen boxes: entries or nodes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+struct Node {
+    min: [[f32; LANES]; 2],
+    max: [[f32; LANES]; 2],
+    farthest: [f32; LANES],
+    nearest: [f32; LANES],
+    /// The triangle that all receivers of a box lie on, if it is one.
+    own: [u32; LANES],
+    /// A bit for each box in which somebody asks.
+    asks: u32,
+}
 
-/// Where the points of entries are found.
-pub(crate) type PointsOf<'p> = &'p (dyn Fn(&Entry) -> &'p BlockPoints + Sync);
+impl Node {
+    const EMPTY: Self = Self {
+        min: [[f32::INFINITY; LANES]; 2],
+        max: [[f32::NEG_INFINITY; LANES]; 2],
+        farthest: [f32::INFINITY; LANES],
+        nearest: [f32::NEG_INFINITY; LANES],
+        own: [NONE; LANES],
+        asks: 0,
+    };
+}
 
-impl ReceiverTile {
-    /// The groups of receivers.
-    pub(crate) fn groups(&self) -> &[Group] {
-        &self.groups
-    }
+/// Points of all parts of the eye's tiles.
+pub(crate) type Parts<'p> = &'p [&'p [BlockPoints]];
 
-    /// Notes that a receiver is in shadow.
-    pub(crate) fn close(&mut self, group: u32, lane: u32) {
-        self.groups[group as usize].open &= !(1 << lane);
-    }
-
-    /// Takes the receivers of these entries.
-    pub(crate) fn set(&mut self, level: SimdLevel, entries: &[Entry], points_of: PointsOf) {
-        dispatch!(level.0, simd => self.set_impl(simd, entries, points_of));
-    }
-
+impl Held {
+    /// The points that its lanes are among.
     #[inline(always)]
-    fn set_impl<S: Simd>(&mut self, simd: S, entries: &[Entry], points_of: PointsOf) {
-        let receivers: usize = entries.iter().map(|e| e.lanes.count_ones() as usize).sum();
-        let wanted = (receivers as f32 / RECEIVERS_A_CELL as f32).sqrt() / BLOCK as f32;
-        self.blocks = (wanted.ceil() as u32).clamp(BLOCKS[0], BLOCKS[1]);
-        let cells = self.blocks * BLOCK;
-        self.side = LIGHT_TILE as f32 / cells as f32;
-        let (scale, last) = (1.0 / self.side, (cells - 1) as f32);
-        let count = (cells * cells) as usize;
-        self.starts.clear();
-        self.starts.resize(count + 1, 0);
-        self.cells.clear();
-        self.cells.reserve(entries.len());
-        for entry in entries {
-            let points = points_of(entry);
-            let x = cell_index(simd, &points.x, scale, last);
-            let y = cell_index(simd, &points.y, scale, last);
-            let block = (y >> 2) * self.blocks + (x >> 2);
-            let cell: [u32; LANES] = (block * 16 + (y & 3) * 4 + (x & 3)).into();
-            let mut lanes = u32::from(entry.lanes);
-            while lanes != 0 {
-                self.starts[cell[lanes.trailing_zeros() as usize] as usize] += 1;
-                lanes &= lanes - 1;
-            }
-            self.cells.push(cell);
-        }
-        self.make_groups();
-        self.fill(entries, points_of);
-    }
-
-    /// From the number of receivers of each cell to its first group.
-    fn make_groups(&mut self) {
-        let mut groups = 0;
-        for start in &mut self.starts {
-            let own = start.div_ceil(LANES as u32);
-            *start = groups * LANES as u32;
-            groups += own;
-        }
-        self.groups.clear();
-        self.groups.resize(groups as usize, EMPTY);
-        self.farthest.clear();
-        self.farthest
-            .resize(self.starts.len() / LANES, [f32::INFINITY; LANES]);
-        self.least = f32::INFINITY;
-        self.unsure.clear();
-    }
-
-    /// Puts the receivers into the groups; `starts` counts receivers on entry and groups on return.
-    #[inline(always)]
-    fn fill(&mut self, entries: &[Entry], points_of: PointsOf) {
-        for (i, (entry, cells)) in entries.iter().zip(&self.cells).enumerate() {
-            let points = points_of(entry);
-            self.least = self.least.min(entry.farthest);
-            let mut lanes = u32::from(entry.lanes);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let cell = cells[lane] as usize;
-                let at = self.starts[cell] as usize;
-                self.starts[cell] += 1;
-                let (group, slot) = (&mut self.groups[at / LANES], at % LANES);
-                group.x[slot] = points.x[lane];
-                group.y[slot] = points.y[lane];
-                group.nearness[slot] = points.nearness[lane];
-                group.id[slot] = (i * LANES + lane) as u32;
-            }
-        }
-        // Every entry is now the end of its cell's receivers, within its last group.
-        let mut first = 0;
-        for cell in 0..self.starts.len() - 1 {
-            let end = self.starts[cell];
-            self.starts[cell] = first;
-            let mut farthest = f32::INFINITY;
-            let mut left = end.saturating_sub(first * LANES as u32);
-            while left > 0 {
-                let group = &mut self.groups[first as usize];
-                group.all = u32::MAX >> (32 - left.min(LANES as u32));
-                group.open = group.all;
-                farthest = group.nearness.iter().fold(farthest, |a, b| a.min(*b));
-                left = left.saturating_sub(LANES as u32);
-                first += 1;
-            }
-            self.farthest[cell / LANES][cell % LANES] = farthest;
-        }
-        *self.starts.last_mut().expect("never empty") = first;
+    pub(crate) fn points<'p>(&self, parts: Parts<'p>) -> &'p BlockPoints {
+        &parts[self.part as usize][self.points as usize]
     }
 }
 
-/// Column or row of cells of sixteen coordinates.
+impl ReceiverTile {
+    /// The entries, in an order of their own.
+    pub(crate) fn held(&self) -> &[Held] {
+        &self.held
+    }
+
+    /// Notes that a receiver is in shadow.
+    pub(crate) fn close(&mut self, entry: u32, lane: u32) {
+        self.held[entry as usize].open &= !(1 << lane);
+    }
+
+    /// Takes the receivers of these entries.
+    pub(crate) fn set<'e>(&mut self, level: SimdLevel, entries: impl Iterator<Item = &'e [Entry]> + Clone) {
+        let all = || entries.clone().flatten();
+        self.next.clear();
+        self.next.resize((CURVE_SIDE * CURVE_SIDE) as usize + 1, 0);
+        let mut width = 0.0;
+        for entry in all() {
+            self.next[place_on_curve(entry) + 1] += 1;
+            width += (entry.max[0] - entry.min[0]).min(entry.max[1] - entry.min[1]);
+        }
+        for i in 1..self.next.len() {
+            self.next[i] += self.next[i - 1];
+        }
+        let count = self.next[self.next.len() - 1] as usize;
+        self.mean_side = width / count as f32;
+        self.held.clear();
+        self.held.resize(count, Held::default());
+        self.nodes.clear();
+        self.nodes.resize(count.div_ceil(LANES), Node::EMPTY);
+        for entry in all() {
+            let slot = &mut self.next[place_on_curve(entry)];
+            let at = *slot as usize;
+            *slot += 1;
+            self.held[at] = Held {
+                part: entry.part,
+                points: entry.points,
+                all: entry.lanes,
+                open: entry.lanes,
+                tested: false,
+            };
+            let (node, lane) = (&mut self.nodes[at / LANES], at % LANES);
+            for axis in 0..2 {
+                node.min[axis][lane] = entry.min[axis];
+                node.max[axis][lane] = entry.max[axis];
+            }
+            node.farthest[lane] = entry.farthest;
+            node.nearest[lane] = entry.nearest;
+            node.own[lane] = entry.own;
+            node.asks |= 1 << lane;
+        }
+        self.unsure.clear();
+        dispatch!(level.0, simd => self.join(simd));
+    }
+
+    /// Nodes above nodes, up to one.
+    #[inline(always)]
+    fn join<S: Simd>(&mut self, simd: S) {
+        self.levels.clear();
+        self.levels.push(0);
+        let mut first = 0;
+        while self.nodes.len() - first > 1 {
+            let end = self.nodes.len();
+            for at in (first..end).step_by(LANES) {
+                let mut above = Node::EMPTY;
+                for (lane, node) in self.nodes[at..(at + LANES).min(end)].iter().enumerate() {
+                    for axis in 0..2 {
+                        above.min[axis][lane] = f32x16::from_slice(simd, &node.min[axis]).reduce_min();
+                        above.max[axis][lane] = f32x16::from_slice(simd, &node.max[axis]).reduce_max();
+                    }
+                    above.farthest[lane] = f32x16::from_slice(simd, &node.farthest).reduce_min();
+                    above.nearest[lane] = f32x16::from_slice(simd, &node.nearest).reduce_max();
+                    let own = u32x16::from_slice(simd, &node.own);
+                    let others = bits_of(simd, own.simd_eq(u32x16::splat(simd, node.own[0])));
+                    if node.asks & !others == 0 {
+                        above.own[lane] = node.own[0];
+                    }
+                    above.asks |= 1 << lane;
+                }
+                self.nodes.push(above);
+            }
+            self.levels.push(end);
+            first = end;
+        }
+        if let Some(top) = self.nodes.last() {
+            for axis in 0..2 {
+                self.min[axis] = f32x16::from_slice(simd, &top.min[axis]).reduce_min();
+                self.max[axis] = f32x16::from_slice(simd, &top.max[axis]).reduce_max();
+            }
+            self.least = f32x16::from_slice(simd, &top.farthest).reduce_min();
+        }
+    }
+
+    /// Notes that everything in these boxes of a node is in shadow.
+    #[cold]
+    fn shut(&mut self, level: usize, node: usize, mut lanes: u32) {
+        while lanes != 0 {
+            let below = node * LANES + lanes.trailing_zeros() as usize;
+            let range = |level: usize, count: usize| {
+                let size = 1 << (4 * level);
+                (below * size).min(count)..((below + 1) * size).min(count)
+            };
+            let all = range(level, self.held.len());
+            for held in &mut self.held[all] {
+                held.tested = true;
+                held.open = 0;
+            }
+            for inner in 0..level {
+                let (start, end) = (self.levels[inner], self.levels[inner + 1]);
+                let shut = range(level - 1 - inner, end - start);
+                for node in &mut self.nodes[start..end][shut] {
+                    node.asks = 0;
+                }
+            }
+            self.forget(level, node, lanes & lanes.wrapping_neg());
+            lanes &= lanes - 1;
+        }
+    }
+
+    /// Notes that nobody asks in a box of a node any more.
+    #[inline(always)]
+    fn forget(&mut self, mut level: usize, mut node: usize, mut lane: u32) {
+        loop {
+            let asks = &mut self.nodes[self.levels[level] + node].asks;
+            *asks &= !lane;
+            level += 1;
+            if *asks != 0 || level == self.levels.len() {
+                return;
+            }
+            lane = 1 << (node % LANES);
+            node /= LANES;
+        }
+    }
+}
+
+/// Where along the curve the middle of an entry lies.
 #[inline(always)]
-fn cell_index<S: Simd>(simd: S, v: &[f32; LANES], scale: f32, last: f32) -> u32x16<S> {
-    let scaled = f32x16::from_slice(simd, v) * f32x16::splat(simd, scale);
-    let kept = scaled
-        .max(f32x16::splat(simd, 0.0))
-        .min(f32x16::splat(simd, last));
-    kept.to_int::<u32x16<S>>()
+fn place_on_curve(entry: &Entry) -> usize {
+    let cell = |axis: usize| {
+        let middle = (entry.min[axis] + entry.max[axis]) * (0.5 * CURVE_SIDE as f32 / LIGHT_TILE as f32);
+        middle.clamp(0.0, CURVE_SIDE as f32 - 1.0) as u32
+    };
+    let spread = |v: u32| {
+        let v = (v | v << 4) & 0x0f0f;
+        let v = (v | v << 2) & 0x3333;
+        (v | v << 1) & 0x5555
+    };
+    (spread(cell(0)) | spread(cell(1)) << 1) as usize
 }
 
 /// a x + b y + c. A function of its own, and not a closure, so that it is compiled for the caller's instruction set.
@@ -202,9 +255,6 @@ fn plane<S: Simd>(simd: S, [a, b, c]: [f32; 3], x: f32x16<S>, y: f32x16<S>) -> f
     a.mul_add(x, b.mul_add(y, c))
 }
 
-/// Which triangle a receiver lies on.
-pub(crate) type OwnPrim<'p> = &'p (dyn Fn(u32) -> u32 + Sync);
-
 /// Draws up to sixteen casters over the receivers of a light tile whose corner is raster point `corner`. Returns a bit for every
 /// lane that could not be set up.
 pub(crate) fn draw_casters(
@@ -213,9 +263,9 @@ pub(crate) fn draw_casters(
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
     (corner, rounding): ([f32; 2], f32),
-    own: OwnPrim,
+    parts: Parts,
 ) -> u32 {
-    dispatch!(level.0, simd => draw_casters_impl(simd, tile, vertices, edges, (corner, rounding), own))
+    dispatch!(level.0, simd => draw_casters_impl(simd, tile, vertices, edges, (corner, rounding), parts))
 }
 
 #[inline(always)]
@@ -225,8 +275,14 @@ fn draw_casters_impl<S: Simd>(
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
     (corner, rounding): ([f32; 2], f32),
-    own: OwnPrim,
+    parts: Parts,
 ) -> u32 {
+    let lanes = u32::MAX >> (32 - vertices.count as u32);
+    let mut areas = AreaLanes::default();
+    let wanted = lanes & areas.set(simd, tile, vertices, corner);
+    if wanted == 0 {
+        return 0;
+    }
     let origin = Origin::Point {
         x: corner[0],
         y: corner[1],
@@ -234,17 +290,55 @@ fn draw_casters_impl<S: Simd>(
         reach: (LIGHT_TILE + 2) as f32,
     };
     set_up(simd, vertices, origin, rounding, edges);
-    let lanes = u32::MAX >> (32 - vertices.count as u32);
-    let mut good = edges.good & lanes;
-    let bad = lanes & !good;
+    let mut good = edges.good & wanted;
+    let bad = wanted & !good;
     while good != 0 {
         let lane = good.trailing_zeros() as usize;
         good &= good - 1;
-        let area = CasterArea::of_lane(vertices, lane, corner);
+        let area = CasterArea {
+            min: [areas.min[0][lane], areas.min[1][lane]],
+            max: [areas.max[0][lane], areas.max[1][lane]],
+            nearest: areas.nearest[lane],
+        };
         let record = edges.record(lane, vertices.prim[lane]);
-        draw_impl(simd, tile, &record, &area, own);
+        draw_impl(simd, tile, &record, &area, parts);
     }
     bad
+}
+
+/// What bounds sixteen casters.
+#[derive(Default)]
+struct AreaLanes {
+    min: [[f32; LANES]; 2],
+    max: [[f32; LANES]; 2],
+    nearest: [f32; LANES],
+}
+
+impl AreaLanes {
+    /// Returns a bit for each caster that may come before a receiver of the tile.
+    #[inline(always)]
+    fn set<S: Simd>(&mut self, simd: S, tile: &ReceiverTile, v: &VertexLanes, corner: [f32; 2]) -> u32 {
+        let nearness = super::load3(simd, &v.nearness);
+        let nearest = max3(nearness);
+        nearest.store_slice(&mut self.nearest);
+        let mut apart = f32x16::splat(simd, f32::NEG_INFINITY);
+        for (axis, lanes) in [&v.x, &v.y].into_iter().enumerate() {
+            let origin = f32x16::splat(simd, corner[axis]);
+            let lanes = super::load3(simd, lanes);
+            let (min, max) = (min3(lanes) - origin, max3(lanes) - origin);
+            min.store_slice(&mut self.min[axis]);
+            max.store_slice(&mut self.max[axis]);
+            let before = f32x16::splat(simd, tile.min[axis]) - max;
+            let behind = min - f32x16::splat(simd, tile.max[axis]);
+            apart = apart.max(before).max(behind);
+        }
+        // Nothing is known of the others.
+        let known = min3(nearness).simd_gt(f32x16::splat(simd, 0.0));
+        let hidden = nearest * f32x16::splat(simd, 1.0 + 2.0 * NEARNESS_BAND);
+        let hidden = hidden.simd_lt(f32x16::splat(simd, tile.least));
+        let apart = apart.simd_gt(f32x16::splat(simd, 2.0 * SLACK));
+        !bits_of(simd, known & (apart | hidden))
+    }
 }
 
 /// What bounds a caster in a light tile.
@@ -294,9 +388,9 @@ pub(crate) fn draw_caster(
     tile: &mut ReceiverTile,
     record: &EdgeRecord,
     area: &CasterArea,
-    own: OwnPrim,
+    parts: Parts,
 ) {
-    dispatch!(level.0, simd => draw_impl(simd, tile, record, area, own));
+    dispatch!(level.0, simd => draw_impl(simd, tile, record, area, parts));
 }
 
 /// How far outside of its rectangle a caster may be met, in raster units: vertices and receivers below the guard are
@@ -309,68 +403,71 @@ fn draw_impl<S: Simd>(
     tile: &mut ReceiverTile,
     record: &EdgeRecord,
     area: &CasterArea,
-    own: OwnPrim,
+    parts: Parts,
 ) {
-    if area.nearest * (1.0 + 2.0 * NEARNESS_BAND) < tile.least {
-        return;
-    }
-    let block_side = tile.side * BLOCK as f32;
-    let last = (tile.blocks - 1) as f32;
-    let (low, high) = (area.min, area.max);
-    let index = |v: f32| (v.max(0.0) / block_side).min(last) as u32;
-    for by in index(low[1] - SLACK)..=index(high[1] + SLACK) {
-        for bx in index(low[0] - SLACK)..=index(high[0] + SLACK) {
-            let block = (by * tile.blocks + bx) as usize;
-            let corner = [bx as f32 * block_side, by as f32 * block_side];
-            let farthest = &tile.farthest[block];
-            let mut cells = reached_cells(simd, tile.side, record, area, corner, farthest);
-            while cells != 0 {
-                let cell = block * LANES + cells.trailing_zeros() as usize;
-                cells &= cells - 1;
-                draw_on_cell(simd, tile, record, cell, own);
+    let side = (area.max[0] - area.min[0]).min(area.max[1] - area.min[1]);
+    let may_cover = side >= tile.mean_side;
+    let top = tile.levels.len() - 1;
+    let (mut at, mut left) = ([0; LEVELS], [0; LEVELS]);
+    let mut level = top;
+    left[top] = tile.enter(simd, (top, 0), record, area, may_cover);
+    loop {
+        if left[level] == 0 {
+            if level == top {
+                return;
             }
+            level += 1;
+            continue;
+        }
+        let below = at[level] * LANES + left[level].trailing_zeros() as usize;
+        left[level] &= left[level] - 1;
+        if level == 0 {
+            draw_on_entry(simd, tile, record, below, parts);
+        } else {
+            level -= 1;
+            at[level] = below;
+            left[level] = tile.enter(simd, (level, below), record, area, may_cover);
         }
     }
 }
 
-/// Column and row of a cell in its block.
-const COLUMN: [f32; LANES] = [
-    0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0,
-];
-const ROW: [f32; LANES] = [
-    0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0,
-];
+impl ReceiverTile {
+    /// The boxes of a node that a caster is to be held against; those that it covers are shut.
+    #[inline(always)]
+    fn enter<S: Simd>(
+        &mut self,
+        simd: S,
+        (level, index): (usize, usize),
+        record: &EdgeRecord,
+        area: &CasterArea,
+        may_cover: bool,
+    ) -> u32 {
+        let node = &self.nodes[self.levels[level] + index];
+        let mut reached = reached_boxes(simd, node, record, area) & node.asks;
+        if may_cover && reached != 0 {
+            let covered = covered_boxes(simd, node, record) & reached;
+            if covered != 0 {
+                reached &= !covered;
+                self.shut(level, index, covered);
+            }
+        }
+        reached
+    }
+}
 
-/// The cells of a block that a caster may reach before their farthest receiver. `corner` is the block's.
+/// The boxes of a node that a caster may reach before their farthest receiver.
 #[inline(always)]
-fn reached_cells<S: Simd>(
-    simd: S,
-    side: f32,
-    record: &EdgeRecord,
-    area: &CasterArea,
-    corner: [f32; 2],
-    farthest: &[f32; LANES],
-) -> u32 {
-    // A point may be put into the neighbouring cell by rounding.
-    let (low, side) = (-SLACK, side + 2.0 * SLACK);
-    let step = side - 2.0 * SLACK;
-    let x_low = f32x16::from_slice(simd, &COLUMN)
-        .mul_add(f32x16::splat(simd, step), f32x16::splat(simd, corner[0] + low));
-    let y_low = f32x16::from_slice(simd, &ROW)
-        .mul_add(f32x16::splat(simd, step), f32x16::splat(simd, corner[1] + low));
-    let (x_high, y_high) = (
-        x_low + f32x16::splat(simd, side),
-        y_low + f32x16::splat(simd, side),
-    );
-
-    // Each edge function where it is largest in the cell.
+fn reached_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, area: &CasterArea) -> u32 {
+    let [x_low, x_high] = sides(simd, node, 0);
+    let [y_low, y_high] = sides(simd, node, 1);
+    // Each edge function where it is largest in the box.
     let EdgeRecord { a, b, c, .. } = *record;
     let edge_0 = corner_plane(simd, [a[0], b[0], c[0]], [x_low, x_high], [y_low, y_high]);
     let edge_1 = corner_plane(simd, [a[1], b[1], c[1]], [x_low, x_high], [y_low, y_high]);
     let edge_2 = corner_plane(simd, [a[2], b[2], c[2]], [x_low, x_high], [y_low, y_high]);
     let inside = edge_0.min(edge_1).min(edge_2);
 
-    // The part of the cell that lies in the caster's rectangle, for its plane is known only there.
+    // The part of the box that lies in the caster's rectangle, for its plane is known only there.
     let x_low = x_low.max(f32x16::splat(simd, area.min[0]));
     let x_high = x_high.min(f32x16::splat(simd, area.max[0]));
     let y_low = y_low.max(f32x16::splat(simd, area.min[1]));
@@ -383,8 +480,42 @@ fn reached_cells<S: Simd>(
     // The floor is far above the plane's error. Written so that what is not a number is kept.
     let bound = (n + f32x16::splat(simd, record.floor)).min(f32x16::splat(simd, area.nearest));
     let bound = bound * f32x16::splat(simd, 1.0 + 2.0 * NEARNESS_BAND);
-    let hidden = bound.simd_lt(f32x16::from_slice(simd, farthest));
-    (!hidden & !apart & inside.simd_ge(f32x16::splat(simd, -1.01))).to_bitmask() as u32
+    let hidden = bound.simd_lt(f32x16::from_slice(simd, &node.farthest));
+    let own = u32x16::from_slice(simd, &node.own).simd_eq(u32x16::splat(simd, record.prim));
+    let reached = inside.simd_ge(f32x16::splat(simd, -1.01));
+    bits_of(simd, reached) & !bits_of(simd, hidden | apart | own)
+}
+
+/// The boxes of a node that a caster certainly covers, before their nearest receiver.
+#[inline(always)]
+fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord) -> u32 {
+    let [x_low, x_high] = sides(simd, node, 0);
+    let [y_low, y_high] = sides(simd, node, 1);
+    // With its sides exchanged a box gives the least value.
+    let EdgeRecord { a, b, c, .. } = *record;
+    let edge_0 = corner_plane(simd, [a[0], b[0], c[0]], [x_high, x_low], [y_high, y_low]);
+    let edge_1 = corner_plane(simd, [a[1], b[1], c[1]], [x_high, x_low], [y_high, y_low]);
+    let edge_2 = corner_plane(simd, [a[2], b[2], c[2]], [x_high, x_low], [y_high, y_low]);
+    // Twice what is certain for one receiver.
+    let covers = edge_0.min(edge_1).min(edge_2).simd_gt(f32x16::splat(simd, 2.0));
+    let slopes = [record.nearness_x, record.nearness_y, record.nearness];
+    let least = corner_plane(simd, slopes, [x_high, x_low], [y_high, y_low]);
+    let most = corner_plane(simd, slopes, [x_low, x_high], [y_low, y_high]);
+    let known: mask32x16<S> =
+        least.simd_ge(f32x16::splat(simd, record.floor)) & most.simd_le(f32x16::splat(simd, record.ceiling));
+    let nearer = least * f32x16::splat(simd, 1.0 - 2.0 * NEARNESS_BAND);
+    let nearer = nearer.simd_gt(f32x16::from_slice(simd, &node.nearest));
+    bits_of(simd, covers & known & nearer)
+}
+
+/// Low and high sides of the boxes of a node on an axis, a little apart.
+#[inline(always)]
+fn sides<S: Simd>(simd: S, node: &Node, axis: usize) -> [f32x16<S>; 2] {
+    let slack = f32x16::splat(simd, SLACK);
+    [
+        f32x16::from_slice(simd, &node.min[axis]) - slack,
+        f32x16::from_slice(simd, &node.max[axis]) + slack,
+    ]
 }
 
 /// The largest value of a x + b y + c over sixteen rectangles.
@@ -400,52 +531,42 @@ fn corner_plane<S: Simd>(
     plane(simd, coefficients, x, y)
 }
 
-/// Holds a caster against the receivers of one cell.
+/// Holds a caster against the receivers of one entry.
 #[inline(always)]
-fn draw_on_cell<S: Simd>(simd: S, tile: &mut ReceiverTile, record: &EdgeRecord, cell: usize, own: OwnPrim) {
-    let groups = tile.starts[cell] as usize..tile.starts[cell + 1] as usize;
-    let mut closed = false;
-    for index in groups.clone() {
-        let group = &mut tile.groups[index];
-        if group.open == 0 {
-            continue;
-        }
-        group.tested = true;
-        let (mut candidates, sure) = cover(simd, group, record);
-        candidates &= group.open;
-        while candidates != 0 {
-            let lane = candidates.trailing_zeros();
-            candidates &= candidates - 1;
-            if own(group.id[lane as usize]) == record.prim {
-                continue;
-            }
-            if sure & 1 << lane != 0 {
-                group.open &= !(1 << lane);
-            } else {
-                tile.unsure.push((index as u32, lane, record.prim));
-            }
-        }
-        closed |= group.open == 0;
+fn draw_on_entry<S: Simd>(simd: S, tile: &mut ReceiverTile, record: &EdgeRecord, index: usize, parts: Parts) {
+    let held = &mut tile.held[index];
+    held.tested = true;
+    let (candidates, sure) = cover(simd, held.points(parts), record);
+    let open = u32::from(held.open);
+    let mut unsure = candidates & !sure & open;
+    held.open &= !(sure as u16);
+    while unsure != 0 {
+        let lane = unsure.trailing_zeros();
+        unsure &= unsure - 1;
+        tile.unsure.push((index as u32, lane, record.prim));
     }
-    if closed && tile.groups[groups].iter().all(|g| g.open == 0) {
-        tile.farthest[cell / LANES][cell % LANES] = f32::INFINITY;
+    if held.open == 0 {
+        tile.forget(0, index / LANES, 1 << (index % LANES));
     }
 }
 
-/// The receivers of a group that a caster may shadow, and those among them that it certainly shadows, unless it is their own triangle.
+/// The receivers of a block that a caster may shadow, and those among them that it certainly shadows; not those that
+/// lie on it.
 #[inline(always)]
-fn cover<S: Simd>(simd: S, group: &Group, record: &EdgeRecord) -> (u32, u32) {
-    let x = f32x16::from_slice(simd, &group.x);
-    let y = f32x16::from_slice(simd, &group.y);
+fn cover<S: Simd>(simd: S, points: &BlockPoints, record: &EdgeRecord) -> (u32, u32) {
+    let x = f32x16::from_slice(simd, &points.x);
+    let y = f32x16::from_slice(simd, &points.y);
     let EdgeRecord { a, b, c, .. } = *record;
     let inside = plane(simd, [a[0], b[0], c[0]], x, y)
         .min(plane(simd, [a[1], b[1], c[1]], x, y))
         .min(plane(simd, [a[2], b[2], c[2]], x, y));
     let covered = inside.simd_ge(f32x16::splat(simd, -1.0));
+    let own = u32x16::from_slice(simd, &points.prims).simd_eq(u32x16::splat(simd, record.prim));
+    let covered = covered & !own;
     if covered.all_false() {
         return (0, 0);
     }
-    let nearness = f32x16::from_slice(simd, &group.nearness);
+    let nearness = f32x16::from_slice(simd, &points.nearness);
     let slopes = [record.nearness_x, record.nearness_y, record.nearness];
     let n = plane(simd, slopes, x, y);
     let (floor, ceiling) = (
@@ -458,5 +579,5 @@ fn cover<S: Simd>(simd: S, group: &Group, record: &EdgeRecord) -> (u32, u32) {
     let nearer = n * f32x16::splat(simd, 1.0 - NEARNESS_BAND);
     let certain = inside.simd_gt(f32x16::splat(simd, 1.0)) & !vague;
     let sure = possible & certain & nearer.simd_gt(nearness);
-    (possible.to_bitmask() as u32, sure.to_bitmask() as u32)
+    (bits_of(simd, possible), bits_of(simd, sure))
 }

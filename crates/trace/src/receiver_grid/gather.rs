@@ -12,24 +12,61 @@ use crate::view::Arrangement;
 use crate::visibility::{Visibility, VisibleTile};
 use crate::{Triangles, exact};
 
-/// The receivers of one tile of the eye's.
+/// The receivers of some of the eye's tiles: a part of all.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Gathered {
+pub(super) struct Part {
     pub(super) points: Vec<BlockPoints>,
-    pub(super) entries: Vec<Entry>,
-    /// Per block, the pixels that are lit without a caster being looked at.
-    pub(super) lit: Vec<u16>,
+    /// Sorted by light tile.
+    entries: Vec<Entry>,
+    /// Where the entries of each light tile start, and the end.
+    starts: Vec<u32>,
+    /// Per light tile, the nearness of its farthest receiver; infinite without one.
+    pub(super) farthest: Vec<f32>,
+    /// Per tile and block, the pixels that are turned to the light.
+    pub(super) asked: Vec<Vec<u16>>,
     pub(super) receivers: u64,
     pub(super) undisturbed: u64,
 }
 
-impl Gathered {
+impl Part {
+    /// The entries of a light tile.
+    pub(super) fn of_tile(&self, tile: usize) -> &[Entry] {
+        &self.entries[self.starts[tile] as usize..self.starts[tile + 1] as usize]
+    }
+
+    /// A counting sort of entries into light tiles.
+    fn sort(&mut self, entries: &[Entry], tiles: usize) {
+        self.starts.resize(tiles + 1, 0);
+        self.farthest.resize(tiles, f32::INFINITY);
+        for entry in entries {
+            let tile = entry.light_tile as usize;
+            self.starts[tile + 1] += 1;
+            self.farthest[tile] = self.farthest[tile].min(entry.farthest);
+        }
+        for i in 0..tiles {
+            self.starts[i + 1] += self.starts[i];
+        }
+        let mut next = self.starts.clone();
+        let Some(&any) = entries.first() else { return };
+        self.entries.resize(entries.len(), any);
+        for entry in entries {
+            let slot = &mut next[entry.light_tile as usize];
+            self.entries[*slot as usize] = *entry;
+            *slot += 1;
+        }
+    }
+
     pub(super) fn bytes(&self) -> usize {
         self.points.capacity() * size_of::<BlockPoints>()
             + self.entries.capacity() * size_of::<Entry>()
-            + self.lit.capacity() * 2
+            + self.starts.capacity() * 8
+            + self.asked.iter().map(|a| a.capacity() * 2).sum::<usize>()
     }
 }
+
+/// Tiles of the eye's in a part: so few that all threads have some, and no more parts than each light tile can look
+/// through.
+pub(super) const PART: usize = 16;
 
 /// Working memory of one thread.
 #[derive(Default)]
@@ -41,44 +78,44 @@ struct GatherWork {
     t: Vec<[f64; LANES]>,
     asked: Vec<u16>,
     unsound: Vec<(u32, u32)>,
+    entries: Vec<Entry>,
 }
 
-/// Finds the receivers of all tiles.
+/// Finds the receivers of all tiles. There are so many light tiles in all faces together.
 pub(super) fn gather(
     visibility: &Visibility,
     triangles: &Triangles,
     query: &LightQuery,
-    faces: &LightFaces,
+    (faces, light_tiles): (&LightFaces, usize),
     level: SimdLevel,
-) -> Vec<Gathered> {
-    visibility
-        .tiles()
-        .par_iter()
-        .enumerate()
-        .map_init(GatherWork::default, |work, (index, tile)| {
+) -> Vec<Part> {
+    let part_of = |work: &mut GatherWork, (index, tiles): (usize, &[VisibleTile])| {
+        let mut part = Part::default();
+        part.points.reserve(tiles.iter().map(|t| t.prims.len()).sum());
+        work.entries.clear();
+        for (i, tile) in tiles.iter().enumerate() {
             work.find_spans(visibility, triangles, query, tile, level);
             work.find_points(visibility, triangles, tile, level);
-            let mut gathered = Gathered {
-                receivers: work.asked.iter().map(|a| u64::from(a.count_ones())).sum(),
-                lit: work.asked.clone(),
-                ..Gathered::default()
-            };
             let asking = Asking {
-                eye_tile: index as u32,
+                eye_tile: (index * PART + i) as u32,
+                part: index as u16,
+                prims: &tile.prims,
                 rays: &work.rays,
                 t: &work.t,
                 pixels: &work.asked,
             };
-            let Gathered { points, entries, .. } = &mut gathered;
-            project_receivers(level, &asking, faces, points, entries);
-            for entry in &gathered.entries {
-                let block = gathered.points[entry.points as usize].block;
-                gathered.lit[block as usize] &= !entry.lanes;
-            }
-            gathered.undisturbed = gathered.lit.iter().map(|l| u64::from(l.count_ones())).sum();
-            gathered
-        })
-        .collect()
+            project_receivers(level, &asking, faces, &mut part.points, &mut work.entries);
+            part.asked.push(work.asked.clone());
+        }
+        let pixels = |bits: &u16| u64::from(bits.count_ones());
+        part.receivers = part.asked.iter().flatten().map(pixels).sum();
+        let held: u64 = work.entries.iter().map(|e| pixels(&e.lanes)).sum();
+        part.undisturbed = part.receivers - held;
+        part.sort(&work.entries, light_tiles);
+        part
+    };
+    let parts = visibility.tiles().par_chunks(PART).enumerate();
+    parts.map_init(GatherWork::default, part_of).collect()
 }
 
 impl GatherWork {

@@ -16,23 +16,23 @@
 //! a reference of one face. What is left is a bit a pixel. Limits: perspective eyes in lanes, others pixel by
 //! pixel; where coordinates pass 1e30 every caster is tested for every pixel.
 
-mod cube;
+mod casters;
 mod gather;
 mod light_tile;
 
+use std::sync::atomic::AtomicU16;
+
 use rayon::prelude::*;
 
-use crate::bins::{Binning, Bins, CellGrid};
-use crate::kernel::pixels::{Entry, LIGHT_TILE};
-use crate::kernel::project::RasterVertex;
-use crate::kernel::{NEARNESS_BAND, SimdLevel};
+use crate::kernel::SimdLevel;
+use crate::kernel::pixels::{BlockPoints, LIGHT_TILE};
 use crate::light_grid::takes_part;
 use crate::view::View;
 use crate::visibility::place;
-use crate::{CastRule, Cone, Light, Triangles, Visibility, exact};
+use crate::{CastRule, Clusters, Cone, Light, Triangles, Visibility, exact};
 
-use cube::FaceParts;
-use gather::Gathered;
+use casters::PlacedClusters;
+use gather::Part;
 use light_tile::LightTileWork;
 
 /// Which pixels' surfaces a light reaches.
@@ -89,14 +89,26 @@ const MAX_TILES: u32 = 32;
 
 impl LitPixels {
     /// Finds the pixels that a light reaches: those whose triangle turns the same side to the light as to the eye, and
-    /// between which and the light there is no caster. Uses all threads of the current rayon pool.
+    /// between which and the light there is no caster. The clusters may have been made when the vertices lay elsewhere.
+    /// Uses all threads of the current rayon pool.
+    ///
+    /// # Panics
+    /// If the clusters are of another number of triangles.
     pub fn find(
         visibility: &Visibility,
         triangles: &Triangles,
+        clusters: &Clusters,
         query: &LightQuery,
         level: SimdLevel,
     ) -> Self {
-        let Some(mut faces) = crate::light_views::views(&query.light, triangles, query.cone) else {
+        assert_eq!(
+            clusters.triangle_count(),
+            triangles.len(),
+            "clusters of other triangles"
+        );
+        let placed = PlacedClusters::new(clusters, triangles);
+        let bounds = placed.bounds();
+        let Some(mut faces) = crate::light_views::views(&query.light, triangles, query.cone, bounds) else {
             return Self::one_by_one(visibility, triangles, query);
         };
         let pixels = visibility.seen() / (faces.views.len() as u64).max(1);
@@ -106,42 +118,46 @@ impl LitPixels {
             let size = [f64::from(view.width), f64::from(view.height)];
             *view = view.window([0.0; 2], size, [tiles * LIGHT_TILE; 2]);
         }
-        let gathered = gather::gather(visibility, triangles, query, &faces, level);
-        let mut lit = Self {
-            counts: LitCounts {
-                receivers: gathered.iter().map(|g| g.receivers).sum(),
-                untested: gathered.iter().map(|g| g.undisturbed).sum(),
-                ..LitCounts::default()
-            },
-            tiles: visibility
-                .tiles()
-                .iter()
-                .zip(&gathered)
-                .map(|(tile, gathered)| LitTile {
-                    stride: tile.stride,
-                    lit: gathered.lit.clone(),
-                })
-                .collect(),
+        let light_tiles = faces.views.len() * (tiles * tiles) as usize;
+        let parts = gather::gather(visibility, triangles, query, (&faces, light_tiles), level);
+        let points: Vec<&[BlockPoints]> = parts.iter().map(|part| &part.points[..]).collect();
+        let lit: Vec<Vec<AtomicU16>> = parts
+            .iter()
+            .flat_map(|part| &part.asked)
+            .map(|asked| asked.iter().map(|&a| AtomicU16::new(a)).collect())
+            .collect();
+        let mut counts = LitCounts {
+            receivers: parts.iter().map(|p| p.receivers).sum(),
+            untested: parts.iter().map(|p| p.undisturbed).sum(),
+            bytes: parts.iter().map(Part::bytes).sum(),
+            ..LitCounts::default()
         };
-        let sorted = SortedEntries::of(&gathered, faces.views.len() * (tiles * tiles) as usize);
-        lit.counts.bytes = gathered.iter().map(Gathered::bytes).sum::<usize>() + sorted.bytes();
-        let parts = FaceParts::of(triangles, &faces, level);
-        let (mut vertices, mut of_a_face) = (Vec::new(), 0);
+        let mut of_a_face = 0;
         for face in 0..faces.views.len() {
             let scene = FaceScene {
                 visibility,
                 triangles,
                 query,
-                gathered: &gathered,
+                parts: &parts,
+                points: &points,
+                lit: &lit,
                 view: &faces.views[face],
                 face: face as u32,
-                parts: &parts,
+                placed: &placed,
                 level,
             };
-            of_a_face = scene.draw(&sorted, &mut vertices, &mut lit).max(of_a_face);
+            of_a_face = scene.draw(&mut counts).max(of_a_face);
         }
-        lit.counts.bytes += of_a_face;
-        lit
+        counts.bytes += placed.bytes() + of_a_face;
+        let strides = visibility.tiles().iter().map(|tile| tile.stride);
+        let tiles = strides.zip(lit).map(|(stride, lit)| LitTile {
+            stride,
+            lit: lit.into_iter().map(AtomicU16::into_inner).collect(),
+        });
+        Self {
+            tiles: tiles.collect(),
+            counts,
+        }
     }
 
     /// Whether the light reaches pixel (x, y) of a tile of the eye's grid, counted from the tile's corner.
@@ -214,153 +230,55 @@ impl LightQuery<'_> {
     }
 }
 
-/// All entries, by light tile.
-struct SortedEntries {
-    starts: Vec<u32>,
-    entries: Vec<Entry>,
-    /// Per light tile, the nearness of its farthest receiver.
-    farthest: Vec<f32>,
-}
-
-impl SortedEntries {
-    fn of(gathered: &[Gathered], tiles: usize) -> Self {
-        let all = || gathered.iter().flat_map(|g| &g.entries);
-        let mut starts = vec![0u32; tiles + 1];
-        let mut farthest = vec![f32::INFINITY; tiles];
-        for entry in all() {
-            let tile = entry.light_tile as usize;
-            starts[tile + 1] += 1;
-            farthest[tile] = farthest[tile].min(entry.farthest);
-        }
-        for i in 0..tiles {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let blank = Entry {
-            light_tile: 0,
-            eye_tile: 0,
-            points: 0,
-            lanes: 0,
-            farthest: 0.0,
-        };
-        let mut entries = vec![blank; starts[tiles] as usize];
-        for entry in all() {
-            let slot = &mut next[entry.light_tile as usize];
-            entries[*slot as usize] = *entry;
-            *slot += 1;
-        }
-        Self {
-            starts,
-            entries,
-            farthest,
-        }
-    }
-
-    fn of_tile(&self, tile: usize) -> &[Entry] {
-        &self.entries[self.starts[tile] as usize..self.starts[tile + 1] as usize]
-    }
-
-    fn bytes(&self) -> usize {
-        self.entries.capacity() * size_of::<Entry>() + self.starts.capacity() * 8
-    }
-}
-
 /// One face of a light and all there is to draw in it.
 struct FaceScene<'f> {
     visibility: &'f Visibility,
     triangles: &'f Triangles<'f>,
     query: &'f LightQuery<'f>,
-    gathered: &'f [Gathered],
+    parts: &'f [Part],
+    /// Points of the parts.
+    points: &'f [&'f [BlockPoints]],
+    /// Of each of the eye's tiles the pixels that no caster was found for yet.
+    lit: &'f [Vec<AtomicU16>],
     view: &'f View,
     face: u32,
-    parts: &'f FaceParts,
+    placed: &'f PlacedClusters<'f>,
     level: SimdLevel,
 }
 
 impl FaceScene<'_> {
-    /// Draws all casters of a face and enters what is left lit; returns the bytes held at most.
-    fn draw(&self, sorted: &SortedEntries, vertices: &mut Vec<RasterVertex>, lit: &mut LitPixels) -> usize {
+    /// Draws all casters of a face and puts out what they shadow; returns the bytes held at most.
+    fn draw(&self, counts: &mut LitCounts) -> usize {
         let tiles = self.view.width / LIGHT_TILE;
         let first = (self.face * tiles * tiles) as usize;
-        let farthest = &sorted.farthest[first..first + (tiles * tiles) as usize];
+        let mut farthest = vec![f32::INFINITY; (tiles * tiles) as usize];
+        for part in self.parts {
+            for (all, own) in farthest.iter_mut().zip(&part.farthest[first..]) {
+                *all = all.min(*own);
+            }
+        }
         let asked: Vec<usize> = (0..farthest.len())
             .filter(|&t| farthest[t] < f32::INFINITY)
             .collect();
         if asked.is_empty() {
             return 0;
         }
-        self.parts
-            .project(self.face, self.view, self.triangles, self.level, vertices);
-        let vertices: &[RasterVertex] = vertices;
-        let (bins, rounding) = (self.bin(vertices, farthest), self.view.rounding() as f32);
+        let (casters, rounding) = (self.find_casters(&farthest), self.view.rounding() as f32);
         let drawn: Vec<_> = asked
             .par_iter()
             .map_init(LightTileWork::default, |work, &tile| {
                 let corner = [tile as u32 % tiles, tile as u32 / tiles].map(|i| (i * LIGHT_TILE) as f32);
-                let entries = sorted.of_tile(first + tile);
-                self.draw_tile(work, entries, bins.cell(tile), vertices, (corner, rounding))
+                self.draw_tile(work, first + tile, casters.of_tile(tile), (corner, rounding))
             })
             .collect();
-        for (&tile, drawn) in asked.iter().zip(&drawn) {
-            for (entry, left) in sorted.of_tile(first + tile).iter().zip(&drawn.lit) {
-                let points = self.gathered[entry.eye_tile as usize].points[entry.points as usize];
-                lit.tiles[entry.eye_tile as usize].lit[points.block as usize] |= left;
-            }
-            lit.counts.untested += drawn.untested;
-            lit.counts.exact_pairs += drawn.exact_pairs;
-            lit.counts.references += drawn.references;
-            lit.counts.light_tiles += 1;
+        for drawn in drawn {
+            counts.untested += drawn.untested;
+            counts.exact_pairs += drawn.exact_pairs;
+            counts.references += drawn.references;
+            counts.light_tiles += 1;
         }
-        bins.bytes() + size_of_val(vertices)
+        casters.bytes()
     }
-
-    /// Sorts the triangles that may matter into light tiles.
-    fn bin(&self, vertices: &[RasterVertex], farthest: &[f32]) -> Bins {
-        let tiles = self.view.width / LIGHT_TILE;
-        let grid = CellGrid {
-            cells: [tiles; 2],
-            side: LIGHT_TILE as f32,
-            size: [self.view.width as f32; 2],
-            pixel_centres: false,
-        };
-        let keep = |prim: u32| {
-            if !self.parts.has(self.face, prim) {
-                return false;
-            }
-            let corners = self.triangles.indices[prim as usize].map(|i| vertices[i as usize]);
-            may_matter(&corners, farthest, tiles)
-                && takes_part(&self.query.light, self.triangles, (self.query.rule)(prim), prim)
-        };
-        Bins::build(self.view, self.triangles, vertices, &grid, Binning::Overlap, keep)
-    }
-}
-
-/// Whether a triangle may come before a receiver of the light tiles that its rectangle touches.
-#[inline]
-fn may_matter(corners: &[RasterVertex; 3], farthest: &[f32], tiles: u32) -> bool {
-    let [a, b, c] = corners;
-    if !(a.nearness > 0.0 && b.nearness > 0.0 && c.nearness > 0.0) {
-        // Behind the light, if all are. Otherwise nothing simple can be said.
-        return !(a.nearness < 0.0 && b.nearness < 0.0 && c.nearness < 0.0);
-    }
-    let last = (tiles - 1) as f32;
-    let range = |v: [f32; 3]| {
-        // Wider than the binning's own slack.
-        let low = (v[0].min(v[1]).min(v[2]) - 1.0) * (1.0 / LIGHT_TILE as f32);
-        let high = (v[0].max(v[1]).max(v[2]) + 1.0) * (1.0 / LIGHT_TILE as f32);
-        (high >= 0.0 && low <= tiles as f32)
-            .then(|| low.clamp(0.0, last) as u32..=high.clamp(0.0, last) as u32)
-    };
-    let (Some(columns), Some(rows)) = (range([a.x, b.x, c.x]), range([a.y, b.y, c.y])) else {
-        return false;
-    };
-    let nearest = a.nearness.max(b.nearness).max(c.nearness) * (1.0 + 2.0 * NEARNESS_BAND);
-    rows.into_iter().any(|row| {
-        let row = (row * tiles) as usize;
-        farthest[row + *columns.start() as usize..=row + *columns.end() as usize]
-            .iter()
-            .any(|&f| nearest >= f)
-    })
 }
 
 #[cfg(test)]

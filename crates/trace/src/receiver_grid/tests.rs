@@ -38,11 +38,12 @@ fn reference(triangles: &Triangles, view: &View, query: &LightQuery) -> Vec<Opti
 fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
     let triangles = mesh.triangles();
     let expected = reference(&triangles, &view, query);
+    let clusters = Clusters::new(&triangles);
     let mut counts = LitCounts::default();
     for level in SimdLevel::available() {
         let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
         let visibility = Visibility::trace(&grid, &|| ());
-        let lit = LitPixels::find(&visibility, &triangles, query, level);
+        let lit = LitPixels::find(&visibility, &triangles, &clusters, query, level);
         for index in 0..grid.tile_count() {
             let tile = grid.tile(index);
             for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
@@ -199,6 +200,7 @@ fn lights_that_are_no_numbers_reach_what_faces_them() {
 fn a_spot_lights_cone_is_one_face() {
     let mesh = Mesh::soup(9, 300, 0.3, 1.0);
     let triangles = mesh.triangles();
+    let clusters = Clusters::new(&triangles);
     let position = Vec3::new(0.1, 2.5, 0.2);
     let axis = DVec3::new(0.1, -1.0, 0.05).normalize();
     let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [90, 60]);
@@ -211,7 +213,7 @@ fn a_spot_lights_cone_is_one_face() {
     let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
     let visibility = Visibility::trace(&grid, &|| ());
     let [all, within] = [None, Some(Cone { axis, half_angle })]
-        .map(|cone| LitPixels::find(&visibility, &triangles, &with(cone), level));
+        .map(|cone| LitPixels::find(&visibility, &triangles, &clusters, &with(cone), level));
     let mut compared = 0;
     for (index, tile) in visibility.tiles().iter().enumerate() {
         for (x, y) in (0..tile.tile.height).flat_map(|y| (0..tile.tile.width).map(move |x| (x, y))) {
@@ -236,6 +238,7 @@ fn a_spot_lights_cone_is_one_face() {
 fn any_number_of_threads_gives_the_same() {
     let mesh = Mesh::soup(12, 2000, 0.2, 1.0);
     let triangles = mesh.triangles();
+    let clusters = Clusters::new(&triangles);
     let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [300, 200]);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -247,11 +250,50 @@ fn any_number_of_threads_gives_the_same() {
             let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
             let visibility = Visibility::trace(&grid, &|| ());
             let query = query(Light::Point(Vec3::new(0.1, 0.2, 0.3)), &view, BOTH);
-            let lit = LitPixels::find(&visibility, &triangles, &query, level);
+            let lit = LitPixels::find(&visibility, &triangles, &clusters, &query, level);
             let bits: Vec<_> = lit.tiles.into_iter().map(|t| t.lit).collect();
             (bits, lit.counts)
         })
     };
     let one = with(1);
     assert!(one == with(2) && one == with(5));
+}
+
+#[test]
+fn large_casters_put_out_many_pixels_at_once() {
+    // A roof of two triangles over most of a hilly ground, and a blob over the rest.
+    let mut mesh = Mesh::blob(12).scaled(0.3, Vec3::new(-1.6, 0.9, 0.2));
+    let corner = |x: i32, z: i32| {
+        let (x, z) = (x as f32 * 0.25, z as f32 * 0.25);
+        Vec3::new(x, 0.1 * (x * 3.0).sin() * (z * 2.0).cos(), z)
+    };
+    for (x, z) in (-8..8).flat_map(|x| (-8..8).map(move |z| (x, z))) {
+        mesh.triangle([corner(x, z), corner(x, z + 1), corner(x + 1, z)]);
+        mesh.triangle([corner(x + 1, z), corner(x, z + 1), corner(x + 1, z + 1)]);
+    }
+    let roof = |x: f32, z: f32| Vec3::new(x, 0.8 + 0.05 * x, z);
+    mesh.triangle([roof(-0.7, -3.0), roof(3.0, 3.0), roof(3.0, -3.0)]);
+    mesh.triangle([roof(-0.7, -3.0), roof(-0.7, 3.0), roof(3.0, 3.0)]);
+    let view = looking(
+        Vec3::new(-1.5, 0.6, 2.8),
+        Vec3::new(0.3, 0.0, 0.0),
+        0.5,
+        [120, 70],
+    );
+    let [seen, lit, ..] = check_lights("roof", &mesh, view, lights());
+    assert!(lit > 2000 && lit * 2 < seen, "{lit} of {seen} lit");
+}
+
+#[test]
+fn the_second_of_two_equal_triangles_casts() {
+    let mut mesh = Mesh::soup(5, 200, 0.3, 1.0);
+    let first = mesh.indices.clone();
+    mesh.indices.extend(&first);
+    let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, [60, 40]);
+    let second: CastRule = &|prim| if prim < 200 { Casts::Nothing } else { Casts::Both };
+    let light = Light::Point(Vec3::new(0.7, 0.9, 0.4));
+    let [_, lit, ..] = check("copies", &mesh, view, &query(light, &view, second));
+    let none: CastRule = &|_| Casts::Nothing;
+    let [_, all, ..] = check("copies", &mesh, view, &query(light, &view, none));
+    assert!(lit < all, "{lit} {all}");
 }
