@@ -55,7 +55,8 @@ impl<'a> Triangles<'a> {
     /// The three corners of a triangle.
     #[inline]
     pub fn corners(&self, prim: u32) -> [Vec3; 3] {
-        self.indices[prim as usize].map(|i| self.vertex(i))
+        let [a, b, c] = self.indices[prim as usize];
+        [self.vertex(a), self.vertex(b), self.vertex(c)]
     }
 
     /// Geometric normal in f64, not normalised; counter-clockwise front.

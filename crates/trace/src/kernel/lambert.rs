@@ -4,13 +4,13 @@
 //! cosine at a point is `facet / |light - point|`. With nearness instead of depth the whole expression is scaled
 //! by it and needs no reciprocal.
 //!
-//! Cost: some 30 vector instructions, one of them a square root and one a division, for sixteen pixels, and a
+//! Cost: some 25 vector instructions, one of them a square root and one a division, for sixteen pixels, and a
 //! look-up of each pixel's facet. Rounding shows in the last of the 8 bits at most.
 
-use fearless_simd::{Simd, SimdFloat, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
 
 use super::tile::{BLOCK, NONE};
-use super::{LANES, SimdLevel};
+use super::{LANES, SimdLevel, load3, splat3};
 
 /// Value of a pixel that sees nothing.
 pub(crate) const BACKGROUND: u8 = 0;
@@ -65,62 +65,120 @@ fn lambert_impl<'t, S: Simd>(
     facet: &impl Fn(u32) -> f32,
     out: &mut [[u8; LANES]],
 ) {
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let lane_x = f32x16::from_fn(simd, |i| (i % BLOCK as usize) as f32 + 0.5);
-    let lane_y = f32x16::from_fn(simd, |i| (i / BLOCK as usize) as f32 + 0.5);
+    // What pixels of a block add to its first pixel's ray.
+    let (dir, origin) = (lane_offsets(&frame.dir), lane_offsets(&frame.origin));
     for (i, out) in out.iter_mut().enumerate() {
         let (column, row) = (i as u32 % tile.stride, i as u32 / tile.stride);
         let (prims, order) = block(column, row);
-        let seen = !u32x16::from_slice(simd, prims).simd_eq(u32x16::splat(simd, NONE));
+        let lanes = u32x16::from_slice(simd, prims);
+        let seen = !lanes.simd_eq(u32x16::splat(simd, NONE));
         if seen.all_false() {
             *out = [BACKGROUND; LANES];
             continue;
         }
-        let facets = facets_of(prims, facet);
+        let uniform = lanes.simd_eq(u32x16::splat(simd, prims[0])).all_true();
+        let facets = facets_of(prims, uniform, facet);
         let mut value = f32x16::from_slice(simd, &facets);
         if let Some(light) = frame.light {
-            let x = lane_x + splat((tile.corner[0] + column * BLOCK) as f32);
-            let y = lane_y + splat((tile.corner[1] + row * BLOCK) as f32);
-            let affine = |rows: &[[f32; 3]; 3], i: usize| {
-                splat(rows[1][i]).mul_add(x, splat(rows[2][i]).mul_add(y, splat(rows[0][i])))
-            };
+            let corner = [tile.corner[0] + column * BLOCK, tile.corner[1] + row * BLOCK];
+            let dir = affine(simd, &frame.dir, &dir, corner);
+            let origin = affine(simd, &frame.origin, &origin, corner);
             let order = f32x16::from_slice(simd, order);
-            // The light seen from the point, times `scale`.
-            let (scale, depth, scaled) = match (tile.depth, frame.parallel) {
-                (true, _) => (splat(1.0), order, false),
-                (false, true) => (splat(1.0), splat(frame.reach) - order, false),
-                (false, false) => (order, splat(1.0), true),
-            };
-            let offset = |i: usize| {
-                let to_light = if scaled {
-                    scale * splat(light[i])
-                } else {
-                    splat(light[i])
-                };
-                let along = depth * affine(&frame.dir, i);
-                if frame.parallel {
-                    to_light - along - affine(&frame.origin, i)
-                } else {
-                    to_light - along
-                }
-            };
-            let (dx, dy, dz) = (offset(0), offset(1), offset(2));
-            let squared = dx.mul_add(dx, dy.mul_add(dy, dz * dz));
-            value = value * scale / squared.max(splat(f32::MIN_POSITIVE)).sqrt();
+            value = cosines(simd, frame, (light, tile.depth), [dir, origin], order, value);
         }
-        let light = value.max(splat(0.0)).min(splat(1.0)) * splat(255.0 - DARK);
-        let shown = seen.select(light + splat(DARK + 0.5), splat(f32::from(BACKGROUND)));
-        let shown: [f32; LANES] = shown.into();
-        *out = shown.map(|v| v as u8);
+        let zero = f32x16::splat(simd, 0.0);
+        let light = value.max(zero).min(f32x16::splat(simd, 1.0));
+        let light = light * f32x16::splat(simd, 255.0 - DARK) + f32x16::splat(simd, DARK + 0.5);
+        let shown = seen.select(light, f32x16::splat(simd, f32::from(BACKGROUND)));
+        let shown: [u32; LANES] = shown.to_int::<u32x16<S>>().into();
+        for (out, value) in out.iter_mut().zip(shown) {
+            *out = value as u8;
+        }
     }
 }
 
-/// One look-up where all pixels see one triangle.
+/// Cosines from facets. The light as seen from the points is scaled by nearness where that saves a reciprocal.
 #[inline(always)]
-fn facets_of(prims: &[u32; LANES], facet: &impl Fn(u32) -> f32) -> [f32; LANES] {
-    if prims.iter().all(|&p| p == prims[0]) {
-        [facet(prims[0]); LANES]
-    } else {
-        std::array::from_fn(|i| if prims[i] == NONE { 0.0 } else { facet(prims[i]) })
+fn cosines<S: Simd>(
+    simd: S,
+    frame: &LambertFrame,
+    (light, depth): ([f32; 3], bool),
+    [dir, origin]: [[f32x16<S>; 3]; 2],
+    order: f32x16<S>,
+    facets: f32x16<S>,
+) -> f32x16<S> {
+    let light = splat3(simd, light);
+    let mut squared = f32x16::splat(simd, f32::MIN_POSITIVE);
+    let scaled = !depth && !frame.parallel;
+    for axis in 0..3 {
+        let offset = if scaled {
+            order * light[axis] - dir[axis]
+        } else {
+            let depth = if depth {
+                order
+            } else {
+                f32x16::splat(simd, frame.reach) - order
+            };
+            light[axis] - depth * dir[axis]
+        };
+        let offset = if frame.parallel {
+            offset - origin[axis]
+        } else {
+            offset
+        };
+        squared = offset.mul_add(offset, squared);
     }
+    let value = if scaled { facets * order } else { facets };
+    value / squared.sqrt()
+}
+
+/// x and y of an affine function's slopes for the pixels of a block, counted from its corner.
+#[inline(always)]
+fn lane_offsets(rows: &[[f32; 3]; 3]) -> [[f32; LANES]; 3] {
+    let mut offsets = [[0.0; LANES]; 3];
+    for (axis, offsets) in offsets.iter_mut().enumerate() {
+        for (lane, offset) in offsets.iter_mut().enumerate() {
+            let (x, y) = (lane % BLOCK as usize, lane / BLOCK as usize);
+            *offset = rows[1][axis] * (x as f32 + 0.5) + rows[2][axis] * (y as f32 + 0.5);
+        }
+    }
+    offsets
+}
+
+/// An affine function at the pixels of the block with that corner.
+#[inline(always)]
+fn affine<S: Simd>(
+    simd: S,
+    rows: &[[f32; 3]; 3],
+    offsets: &[[f32; LANES]; 3],
+    corner: [u32; 2],
+) -> [f32x16<S>; 3] {
+    let (x, y) = (corner[0] as f32, corner[1] as f32);
+    let mut start = [0.0; 3];
+    for (axis, start) in start.iter_mut().enumerate() {
+        *start = rows[0][axis] + rows[1][axis] * x + rows[2][axis] * y;
+    }
+    let (start, offsets) = (splat3(simd, start), load3(simd, offsets));
+    [
+        start[0] + offsets[0],
+        start[1] + offsets[1],
+        start[2] + offsets[2],
+    ]
+}
+
+/// One look-up for each triangle that successive pixels see.
+#[inline(always)]
+fn facets_of(prims: &[u32; LANES], uniform: bool, facet: &impl Fn(u32) -> f32) -> [f32; LANES] {
+    if uniform {
+        return [facet(prims[0]); LANES];
+    }
+    let mut facets = [0.0; LANES];
+    let mut last = (NONE, 0.0);
+    for (facets, &prim) in facets.iter_mut().zip(prims) {
+        if prim != last.0 {
+            last = (prim, if prim == NONE { 0.0 } else { facet(prim) });
+        }
+        *facets = last.1;
+    }
+    facets
 }

@@ -12,6 +12,7 @@ use glam::{DVec3, Vec3, Vec3Swizzles};
 use super::project::project_half;
 use super::tile::{BLOCK, NONE};
 use super::{LANES, SimdLevel, bits_of};
+use crate::Light;
 use crate::view::{Arrangement, View};
 
 /// Lanes of f64 in half a block: two rows of four pixels.
@@ -98,6 +99,9 @@ impl TileRays {
     }
 }
 
+/// A generous bound on the relative error of a difference, 2^-46.
+const ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
+
 /// A triangle as eye rays from one center meet it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelPlane {
@@ -109,20 +113,44 @@ pub(crate) struct PixelPlane {
 }
 
 impl PixelPlane {
-    /// The operations of [`crate::exact::attributes`].
-    pub(crate) fn new(center: DVec3, corners: [Vec3; 3]) -> Self {
-        let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
+    /// The operations of [`crate::exact::attributes`]. Also tells on which sides of the triangle these two lie, as
+    /// [`crate::exact::side`] has it, where that is beyond doubt.
+    pub(crate) fn new(
+        center: DVec3,
+        [v0, v1, v2]: [Vec3; 3],
+        ends: [&Light; 2],
+    ) -> (Self, [Option<bool>; 2]) {
+        let (v0, v1, v2) = (v0.as_dvec3(), v1.as_dvec3(), v2.as_dvec3());
         let (a0, edge1, edge2) = (v0 - center, v1 - v0, v2 - v0);
         let normal = edge1.cross(edge2);
         let height = a0.dot(normal);
         let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
         let doubt = terms * (1.0 / (1u64 << 27) as f64);
         let sound = height.abs() > doubt.dot(a0.abs());
-        Self {
+        let size = edge1.abs().max(edge2.abs()).max_element();
+        let front = |end: &Light| {
+            let (value, bound) = match *end {
+                Light::Point(position) => {
+                    let a = position.as_dvec3() - v0;
+                    // The exact side rounds differences of positions, each by 2^-53 of its size.
+                    let far = a.abs().max_element() + size;
+                    let rounding = far * far * (size + far * ROUNDING) * ROUNDING;
+                    (a.dot(normal), doubt.dot(a.abs()) + rounding)
+                }
+                Light::Directional(direction) => {
+                    let d = direction.as_dvec3();
+                    (d.dot(normal), doubt.dot(d.abs()))
+                }
+            };
+            (value.abs() > bound).then_some(value > 0.0)
+        };
+        let fronts = [front(ends[0]), front(ends[1])];
+        let plane = Self {
             normal,
             doubt,
             height: if sound { height } else { f64::NAN },
-        }
+        };
+        (plane, fronts)
     }
 
     /// One whose every pixel is to be done by itself.

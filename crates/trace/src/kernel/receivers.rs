@@ -113,13 +113,13 @@ impl ReceiverTile {
         let mut width = 0.0;
         for entry in all() {
             self.next[place_on_curve(entry) + 1] += 1;
-            width += (entry.max[0] - entry.min[0]).min(entry.max[1] - entry.min[1]);
+            width += (entry.max[0] - entry.min[0]).max(entry.max[1] - entry.min[1]);
         }
         for i in 1..self.next.len() {
             self.next[i] += self.next[i - 1];
         }
         let count = self.next[self.next.len() - 1] as usize;
-        self.mean_side = width / count as f32;
+        self.mean_side = 2.0 * width / count as f32;
         self.held.clear();
         self.held.resize(count, Held::default());
         self.nodes.clear();

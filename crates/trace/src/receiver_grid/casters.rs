@@ -164,19 +164,23 @@ impl Finder<'_> {
         let Some(window) = view.window_of_box(low, high) else {
             return false;
         };
+        let size = f64::from(self.tiles * LIGHT_TILE);
         let mut tiles = [[0; 2]; 2];
-        for axis in 0..2 {
-            let size = f64::from(self.tiles * LIGHT_TILE);
+        for (tiles, (min, max)) in tiles.iter_mut().zip(window.min.into_iter().zip(window.max)) {
             // Written so that what is no number is kept.
-            if window.min[axis] - SLACK >= size || window.max[axis] + SLACK < 0.0 {
+            if min - SLACK >= size || max + SLACK < 0.0 {
                 return false;
             }
-            let tile = |v: f64| ((v / f64::from(LIGHT_TILE)).max(0.0) as u32).min(self.tiles - 1);
-            tiles[axis] = [tile(window.min[axis] - SLACK), tile(window.max[axis] + SLACK)];
+            *tiles = [self.tile_at(min - SLACK), self.tile_at(max + SLACK)];
         }
         let nearest = (window.nearest * f64::from(1.0 + 4.0 * NEARNESS_BAND)) as f32;
         let [[x0, x1], [y0, y1]] = tiles;
         self.any_tile([x0, y0, x1, y1], nearest)
+    }
+
+    /// Column or row of light tiles of a coordinate.
+    fn tile_at(&self, v: f64) -> u32 {
+        ((v / f64::from(LIGHT_TILE)).max(0.0) as u32).min(self.tiles - 1)
     }
 
     /// Whether somebody in these light tiles is as far as that.
@@ -242,12 +246,11 @@ impl Finder<'_> {
         if !self.casts(prim) {
             return;
         }
-        let tile = |v: f64| ((v / f64::from(LIGHT_TILE)).max(0.0) as u32).min(self.tiles - 1);
         let rect = [
-            tile(min[0] - SLACK),
-            tile(min[1] - SLACK),
-            tile(max[0] + SLACK),
-            tile(max[1] + SLACK),
+            self.tile_at(min[0] - SLACK),
+            self.tile_at(min[1] - SLACK),
+            self.tile_at(max[0] + SLACK),
+            self.tile_at(max[1] + SLACK),
         ];
         self.take_rows(&precise, rect, f32::INFINITY);
         self.keep(batch, lane, prim);

@@ -141,8 +141,14 @@ impl GatherWork {
         let in_lanes = matches!(view.arrangement, Arrangement::Perspective);
         let mut plane_of = |prim: u32| {
             table.entry(prim, || {
-                query.faces(triangles, prim).then(|| {
-                    let plane = PixelPlane::new(view.center.as_dvec3(), triangles.corners(prim));
+                let ends = [&query.light, &query.eye];
+                let corners = triangles.corners(prim);
+                let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
+                let faces = match fronts {
+                    [Some(lit), Some(seen)] => lit == seen,
+                    _ => query.faces(triangles, prim),
+                };
+                faces.then(|| {
                     planes.push(if in_lanes { plane } else { plane.unsound() });
                     planes.len() as u32 - 1
                 })
