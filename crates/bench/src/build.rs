@@ -87,9 +87,7 @@ pub fn measure(
         runs: options.runs,
         scenes: Vec::new(),
     };
-    let ours = Rayward {
-        casters: CasterPolicy::Auto,
-    };
+    let ours = Rayward::new(CasterPolicy::Auto);
     for scene in scenes {
         progress(&scene.name);
         let size = [options.width, options.height];

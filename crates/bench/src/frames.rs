@@ -173,13 +173,9 @@ fn contenders<'s>(
     libraries: &[Library],
 ) -> Result<Vec<Box<Drawer<'s>>>> {
     let triangles = scene.triangles();
-    let mut contenders: Vec<Box<Drawer<'s>>> = vec![Box::new(Rayward {
-        casters: CasterPolicy::Auto,
-    })];
+    let mut contenders: Vec<Box<Drawer<'s>>> = vec![Box::new(Rayward::new(CasterPolicy::Auto))];
     if options.kinds.iter().any(|&kind| kind != FrameKind::Eye) {
-        contenders.push(Box::new(Rayward {
-            casters: CasterPolicy::Both,
-        }));
+        contenders.push(Box::new(Rayward::new(CasterPolicy::Both)));
     }
     if options.peers {
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Wide)));

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 use rayon::prelude::*;
 use rayward::trace::{
     AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Facets, Light, LightQuery,
-    LitPixels, Receiver, Tile, TileHits, View, Visibility, darken, darken_unlit, exact,
+    LitPixels, LitScratch, Receiver, Tile, TileHits, View, Visibility, darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
@@ -16,10 +16,12 @@ use crate::contender::{Contender, FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::{Picture, Time};
 
 /// Rayward with one choice of casters.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(crate) struct Rayward {
     /// Which sides of triangles cast.
-    pub(crate) casters: CasterPolicy,
+    casters: CasterPolicy,
+    /// Memory of the last frame.
+    scratch: Mutex<LitScratch>,
 }
 
 /// Side of the tiles of all pictures.
@@ -72,6 +74,13 @@ pub(crate) fn eye_grid<'s>(job: &Job<'s>) -> EyeGrid<'s> {
 }
 
 impl Rayward {
+    pub(crate) fn new(casters: CasterPolicy) -> Self {
+        Self {
+            casters,
+            scratch: Mutex::default(),
+        }
+    }
+
     fn draw_hard(&self, job: &Job, eye: &EyeGrid, facets: &Facets, picture: &mut Picture) -> u64 {
         let mut tiles: Vec<_> = picture.tiles_mut().map(Mutex::new).collect();
         let visibility = Visibility::trace_and(eye, &|tile: &Tile, hits: &TileHits| {
@@ -104,6 +113,7 @@ impl Rayward {
                 &job.scene.clusters,
                 &query,
                 job.level,
+                &mut self.scratch.lock().expect("no light panics"),
             )
         })
     }

@@ -188,9 +188,7 @@ fn one_thread(options: &ScalingOptions, job: &Job, value: u64, lights: usize) ->
 }
 
 fn point(options: &ScalingOptions, job: &Job, threads: usize, value: u64, lights: usize) -> Result<Point> {
-    let ours = Rayward {
-        casters: CasterPolicy::Auto,
-    };
+    let ours = Rayward::new(CasterPolicy::Auto);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     let lights = job.scene.lights_around(lights);
     let (width, height) = (job.view.width, job.view.height);

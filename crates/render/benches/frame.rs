@@ -16,8 +16,8 @@ use divan::counter::ItemsCount;
 use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
     AreaLight, AreaLightTree, AreaScratch, Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions,
-    LightQuery, LitPixels, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits, View,
-    Visibility, exact,
+    LightQuery, LitPixels, LitScratch, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits,
+    View, Visibility, exact,
 };
 use rayward::{CameraFrame, FramePlan, RenderOptions, shadow_end, triangles};
 
@@ -209,12 +209,20 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
             eye: Light::Point(view.center),
             rule: &|_| Casts::Both,
         };
-        let run = || {
+        let mut scratch = LitScratch::default();
+        let mut run = || {
             let level = SimdLevel::detect();
             let options = EyeGridOptions::default();
             let grid = EyeGrid::build_clustered(view, triangles, &frame.clusters, options, level);
             let visibility = Visibility::trace(&grid, &|| ());
-            LitPixels::find(&visibility, &triangles, &frame.clusters, &query, level)
+            LitPixels::find(
+                &visibility,
+                &triangles,
+                &frame.clusters,
+                &query,
+                level,
+                &mut scratch,
+            )
         };
         let counts = run().counts;
         if !is_test() {

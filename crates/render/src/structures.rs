@@ -4,8 +4,8 @@ use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, PointLightGrid,
-    SimdLevel, Tile, View, Visibility,
+    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
+    PointLightGrid, SimdLevel, Tile, View, Visibility,
 };
 
 use crate::casters::CasterRules;
@@ -80,6 +80,7 @@ impl<'g> FrameStructures<'g> {
             stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
         });
 
+        let mut scratch = LitScratch::default();
         let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
         for (i, plan) in plan.lights.iter().enumerate() {
             let Some(plan) = plan else {
@@ -99,7 +100,7 @@ impl<'g> FrameStructures<'g> {
                 (geometry, clusters),
                 rules,
                 eye_point,
-                options.level,
+                (options.level, &mut scratch),
             );
             stats.0.push(shadows.stats(&name, start));
             lights.push(shadows);
@@ -207,7 +208,7 @@ fn shadows_of<'g>(
     (geometry, clusters): (&'g FrameGeometry, &Clusters),
     rules: &CasterRules,
     eye: Light,
-    level: SimdLevel,
+    (level, scratch): (SimdLevel, &mut LitScratch),
 ) -> LightShadows<'g> {
     let triangles = triangles(geometry);
     if let Some(area) = plan.area {
@@ -223,7 +224,9 @@ fn shadows_of<'g>(
                 eye,
                 rule: &rule,
             };
-            LightShadows::Pixels(LitPixels::find(visibility, &triangles, clusters, &query, level))
+            LightShadows::Pixels(LitPixels::find(
+                visibility, &triangles, clusters, &query, level, scratch,
+            ))
         }
         None => LightShadows::Grid(PointLightGrid::build(
             plan.light, triangles, &rule, plan.grid, level,

@@ -79,7 +79,7 @@ pub use moving::{MovingAt, MovingGrids, MovingTriangles, Vertices};
 pub use perspective_grids::PerspectiveGrids;
 pub use queries::Candidates;
 pub use ray::{Hit, Light, Ray, Receiver};
-pub use receiver_grid::{LightQuery, LitCounts, LitPixels};
+pub use receiver_grid::{LightQuery, LitCounts, LitPixels, LitScratch};
 pub use samples::{MAX_SAMPLES, Samples};
 pub use surface_ray::SurfaceRay;
 pub use topology::Topology;

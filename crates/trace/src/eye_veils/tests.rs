@@ -22,7 +22,7 @@ fn brute(triangles: &Triangles, ray: &ViewRay, keep: &dyn Fn(u32) -> bool) -> Ve
 /// Every `opaque`-th triangle is opaque, the others are not.
 fn check(name: &str, mesh: &Mesh, view: View, opaque: u32, tile: u32) -> usize {
     let triangles = mesh.triangles();
-    let is_veil = |prim: u32| opaque == 0 || prim % opaque != 0;
+    let is_veil = |prim: u32| opaque == 0 || !prim.is_multiple_of(opaque);
     let mut count = 0;
     for level in SimdLevel::available() {
         let options = EyeGridOptions {

@@ -62,8 +62,8 @@ pub(crate) struct Held {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Node {
-    min: [[f32; LANES]; 2],
-    max: [[f32; LANES]; 2],
+    /// Of x and y the low and the high sides, a little apart.
+    sides: [[[f32; LANES]; 2]; 2],
     farthest: [f32; LANES],
     nearest: [f32; LANES],
     /// The triangle that all receivers of a box lie on, if it is one.
@@ -74,8 +74,7 @@ struct Node {
 
 impl Node {
     const EMPTY: Self = Self {
-        min: [[f32::INFINITY; LANES]; 2],
-        max: [[f32::NEG_INFINITY; LANES]; 2],
+        sides: [[[f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]]; 2],
         farthest: [f32::INFINITY; LANES],
         nearest: [f32::NEG_INFINITY; LANES],
         own: [NONE; LANES],
@@ -137,8 +136,8 @@ impl ReceiverTile {
             };
             let (node, lane) = (&mut self.nodes[at / LANES], at % LANES);
             for axis in 0..2 {
-                node.min[axis][lane] = entry.min[axis];
-                node.max[axis][lane] = entry.max[axis];
+                node.sides[axis][0][lane] = entry.min[axis] - SLACK;
+                node.sides[axis][1][lane] = entry.max[axis] + SLACK;
             }
             node.farthest[lane] = entry.farthest;
             node.nearest[lane] = entry.nearest;
@@ -161,8 +160,9 @@ impl ReceiverTile {
                 let mut above = Node::EMPTY;
                 for (lane, node) in self.nodes[at..(at + LANES).min(end)].iter().enumerate() {
                     for axis in 0..2 {
-                        above.min[axis][lane] = f32x16::from_slice(simd, &node.min[axis]).reduce_min();
-                        above.max[axis][lane] = f32x16::from_slice(simd, &node.max[axis]).reduce_max();
+                        let [low, high] = &node.sides[axis];
+                        above.sides[axis][0][lane] = f32x16::from_slice(simd, low).reduce_min();
+                        above.sides[axis][1][lane] = f32x16::from_slice(simd, high).reduce_max();
                     }
                     above.farthest[lane] = f32x16::from_slice(simd, &node.farthest).reduce_min();
                     above.nearest[lane] = f32x16::from_slice(simd, &node.nearest).reduce_max();
@@ -180,8 +180,9 @@ impl ReceiverTile {
         }
         if let Some(top) = self.nodes.last() {
             for axis in 0..2 {
-                self.min[axis] = f32x16::from_slice(simd, &top.min[axis]).reduce_min();
-                self.max[axis] = f32x16::from_slice(simd, &top.max[axis]).reduce_max();
+                let [low, high] = &top.sides[axis];
+                self.min[axis] = f32x16::from_slice(simd, low).reduce_min();
+                self.max[axis] = f32x16::from_slice(simd, high).reduce_max();
             }
             self.least = f32x16::from_slice(simd, &top.farthest).reduce_min();
         }
@@ -406,11 +407,11 @@ fn draw_impl<S: Simd>(
     parts: Parts,
 ) {
     let side = (area.max[0] - area.min[0]).min(area.max[1] - area.min[1]);
-    let may_cover = side >= tile.mean_side;
+    let how = (largest_at(record), side >= tile.mean_side);
     let top = tile.levels.len() - 1;
     let (mut at, mut left) = ([0; LEVELS], [0; LEVELS]);
     let mut level = top;
-    left[top] = tile.enter(simd, (top, 0), record, area, may_cover);
+    left[top] = tile.enter(simd, (top, 0), record, area, how);
     loop {
         if left[level] == 0 {
             if level == top {
@@ -426,7 +427,7 @@ fn draw_impl<S: Simd>(
         } else {
             level -= 1;
             at[level] = below;
-            left[level] = tile.enter(simd, (level, below), record, area, may_cover);
+            left[level] = tile.enter(simd, (level, below), record, area, how);
         }
     }
 }
@@ -440,12 +441,12 @@ impl ReceiverTile {
         (level, index): (usize, usize),
         record: &EdgeRecord,
         area: &CasterArea,
-        may_cover: bool,
+        (largest, may_cover): (Sides, bool),
     ) -> u32 {
         let node = &self.nodes[self.levels[level] + index];
-        let mut reached = reached_boxes(simd, node, record, area) & node.asks;
+        let mut reached = reached_boxes(simd, node, record, area, largest) & node.asks;
         if may_cover && reached != 0 {
-            let covered = covered_boxes(simd, node, record) & reached;
+            let covered = covered_boxes(simd, node, record, largest) & reached;
             if covered != 0 {
                 reached &= !covered;
                 self.shut(level, index, covered);
@@ -455,80 +456,97 @@ impl ReceiverTile {
     }
 }
 
+/// Which sides of a box give the largest value of the edge functions, as positions among a node's sides: looked up, for
+/// branches on signs would be guessed wrong.
+type Sides = [[usize; 2]; 3];
+
+#[inline(always)]
+fn largest_at(record: &EdgeRecord) -> Sides {
+    let side = |slope: f32| usize::from(slope > 0.0);
+    let EdgeRecord { a, b, .. } = record;
+    [
+        [side(a[0]), side(b[0])],
+        [side(a[1]), side(b[1])],
+        [side(a[2]), side(b[2])],
+    ]
+}
+
+/// The least of the edge functions, each at one side of the boxes in x and y.
+#[inline(always)]
+fn edges_at<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, sides: Sides) -> f32x16<S> {
+    let EdgeRecord { a, b, c, .. } = *record;
+    let mut least = f32x16::splat(simd, f32::INFINITY);
+    for edge in 0..3 {
+        let x = f32x16::from_slice(simd, &node.sides[0][sides[edge][0]]);
+        let y = f32x16::from_slice(simd, &node.sides[1][sides[edge][1]]);
+        least = least.min(plane(simd, [a[edge], b[edge], c[edge]], x, y));
+    }
+    least
+}
+
 /// The boxes of a node that a caster may reach before their farthest receiver.
 #[inline(always)]
-fn reached_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, area: &CasterArea) -> u32 {
-    let [x_low, x_high] = sides(simd, node, 0);
-    let [y_low, y_high] = sides(simd, node, 1);
-    // Each edge function where it is largest in the box.
-    let EdgeRecord { a, b, c, .. } = *record;
-    let edge_0 = corner_plane(simd, [a[0], b[0], c[0]], [x_low, x_high], [y_low, y_high]);
-    let edge_1 = corner_plane(simd, [a[1], b[1], c[1]], [x_low, x_high], [y_low, y_high]);
-    let edge_2 = corner_plane(simd, [a[2], b[2], c[2]], [x_low, x_high], [y_low, y_high]);
-    let inside = edge_0.min(edge_1).min(edge_2);
+fn reached_boxes<S: Simd>(
+    simd: S,
+    node: &Node,
+    record: &EdgeRecord,
+    area: &CasterArea,
+    largest: Sides,
+) -> u32 {
+    let inside = edges_at(simd, node, record, largest);
+    let reached = inside.simd_ge(f32x16::splat(simd, -1.01));
 
     // The part of the box that lies in the caster's rectangle, for its plane is known only there.
-    let x_low = x_low.max(f32x16::splat(simd, area.min[0]));
-    let x_high = x_high.min(f32x16::splat(simd, area.max[0]));
-    let y_low = y_low.max(f32x16::splat(simd, area.min[1]));
-    let y_high = y_high.min(f32x16::splat(simd, area.max[1]));
+    let [[x_low, x_high], [y_low, y_high]] = &node.sides;
+    let x_low = f32x16::from_slice(simd, x_low).max(f32x16::splat(simd, area.min[0]));
+    let x_high = f32x16::from_slice(simd, x_high).min(f32x16::splat(simd, area.max[0]));
+    let y_low = f32x16::from_slice(simd, y_low).max(f32x16::splat(simd, area.min[1]));
+    let y_high = f32x16::from_slice(simd, y_high).min(f32x16::splat(simd, area.max[1]));
     let slack = f32x16::splat(simd, 2.0 * SLACK);
     let apart = (x_low - x_high).max(y_low - y_high).simd_gt(slack);
 
-    let slopes = [record.nearness_x, record.nearness_y, record.nearness];
-    let n = corner_plane(simd, slopes, [x_low, x_high], [y_low, y_high]);
+    let n = largest_plane(simd, record, [x_low, x_high], [y_low, y_high]);
     // The floor is far above the plane's error. Written so that what is not a number is kept.
     let bound = (n + f32x16::splat(simd, record.floor)).min(f32x16::splat(simd, area.nearest));
     let bound = bound * f32x16::splat(simd, 1.0 + 2.0 * NEARNESS_BAND);
     let hidden = bound.simd_lt(f32x16::from_slice(simd, &node.farthest));
     let own = u32x16::from_slice(simd, &node.own).simd_eq(u32x16::splat(simd, record.prim));
-    let reached = inside.simd_ge(f32x16::splat(simd, -1.01));
-    bits_of(simd, reached) & !bits_of(simd, hidden | apart | own)
+    bits_of(simd, reached & !(hidden | apart | own))
+}
+
+/// The largest nearness of a caster's plane over sixteen rectangles.
+#[inline(always)]
+fn largest_plane<S: Simd>(
+    simd: S,
+    record: &EdgeRecord,
+    [x_low, x_high]: [f32x16<S>; 2],
+    [y_low, y_high]: [f32x16<S>; 2],
+) -> f32x16<S> {
+    let (a, b) = (record.nearness_x, record.nearness_y);
+    let x = f32x16::splat(simd, a.max(0.0)) * x_high;
+    let x = f32x16::splat(simd, a.min(0.0)).mul_add(x_low, x);
+    let y = f32x16::splat(simd, b.max(0.0)).mul_add(y_high, f32x16::splat(simd, record.nearness));
+    let y = f32x16::splat(simd, b.min(0.0)).mul_add(y_low, y);
+    x + y
 }
 
 /// The boxes of a node that a caster certainly covers, before their nearest receiver.
 #[inline(always)]
-fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord) -> u32 {
-    let [x_low, x_high] = sides(simd, node, 0);
-    let [y_low, y_high] = sides(simd, node, 1);
-    // With its sides exchanged a box gives the least value.
-    let EdgeRecord { a, b, c, .. } = *record;
-    let edge_0 = corner_plane(simd, [a[0], b[0], c[0]], [x_high, x_low], [y_high, y_low]);
-    let edge_1 = corner_plane(simd, [a[1], b[1], c[1]], [x_high, x_low], [y_high, y_low]);
-    let edge_2 = corner_plane(simd, [a[2], b[2], c[2]], [x_high, x_low], [y_high, y_low]);
+fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Sides) -> u32 {
+    let least_at = largest.map(|at| at.map(|side| 1 - side));
     // Twice what is certain for one receiver.
-    let covers = edge_0.min(edge_1).min(edge_2).simd_gt(f32x16::splat(simd, 2.0));
-    let slopes = [record.nearness_x, record.nearness_y, record.nearness];
-    let least = corner_plane(simd, slopes, [x_high, x_low], [y_high, y_low]);
-    let most = corner_plane(simd, slopes, [x_low, x_high], [y_low, y_high]);
+    let covers = edges_at(simd, node, record, least_at).simd_gt(f32x16::splat(simd, 2.0));
+    let [[x_low, x_high], [y_low, y_high]] = &node.sides;
+    let x = [f32x16::from_slice(simd, x_low), f32x16::from_slice(simd, x_high)];
+    let y = [f32x16::from_slice(simd, y_low), f32x16::from_slice(simd, y_high)];
+    // With its sides exchanged a box gives the least value.
+    let least = largest_plane(simd, record, [x[1], x[0]], [y[1], y[0]]);
+    let most = largest_plane(simd, record, x, y);
     let known: mask32x16<S> =
         least.simd_ge(f32x16::splat(simd, record.floor)) & most.simd_le(f32x16::splat(simd, record.ceiling));
     let nearer = least * f32x16::splat(simd, 1.0 - 2.0 * NEARNESS_BAND);
     let nearer = nearer.simd_gt(f32x16::from_slice(simd, &node.nearest));
     bits_of(simd, covers & known & nearer)
-}
-
-/// Low and high sides of the boxes of a node on an axis, a little apart.
-#[inline(always)]
-fn sides<S: Simd>(simd: S, node: &Node, axis: usize) -> [f32x16<S>; 2] {
-    let slack = f32x16::splat(simd, SLACK);
-    [
-        f32x16::from_slice(simd, &node.min[axis]) - slack,
-        f32x16::from_slice(simd, &node.max[axis]) + slack,
-    ]
-}
-
-/// The largest value of a x + b y + c over sixteen rectangles.
-#[inline(always)]
-fn corner_plane<S: Simd>(
-    simd: S,
-    coefficients: [f32; 3],
-    [x_low, x_high]: [f32x16<S>; 2],
-    [y_low, y_high]: [f32x16<S>; 2],
-) -> f32x16<S> {
-    let x = if coefficients[0] > 0.0 { x_high } else { x_low };
-    let y = if coefficients[1] > 0.0 { y_high } else { y_low };
-    plane(simd, coefficients, x, y)
 }
 
 /// Holds a caster against the receivers of one entry.

@@ -27,11 +27,12 @@ const CHUNK: usize = 128;
 /// All clusters where they are now.
 pub(super) struct PlacedClusters<'c> {
     clusters: &'c Clusters,
-    chunks: Vec<PlacedChunk>,
+    chunks: &'c [PlacedChunk],
 }
 
-#[derive(Default)]
-struct PlacedChunk {
+/// Some of them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PlacedChunk {
     /// See [`Clusters::place`].
     points: Vec<[f32; LANES]>,
     boxes: Vec<[Vec3; 2]>,
@@ -40,21 +41,25 @@ struct PlacedChunk {
 }
 
 impl<'c> PlacedClusters<'c> {
-    pub(super) fn new(clusters: &'c Clusters, triangles: &Triangles) -> Self {
+    /// Places them in `chunks`, whatever these held.
+    pub(super) fn new(
+        clusters: &'c Clusters,
+        triangles: &Triangles,
+        chunks: &'c mut Vec<PlacedChunk>,
+    ) -> Self {
         let count = clusters.len_with_copies();
-        let chunks = (0..count.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
-            let mut placed = PlacedChunk::default();
+        chunks.resize_with(count.div_ceil(CHUNK), PlacedChunk::default);
+        chunks.par_iter_mut().enumerate().for_each(|(chunk, placed)| {
+            placed.points.clear();
+            placed.boxes.clear();
+            placed.ends.clear();
             for index in chunk * CHUNK..((chunk + 1) * CHUNK).min(count) {
                 let place = clusters.place(index, triangles, &mut placed.points);
                 placed.boxes.push(place);
                 placed.ends.push(placed.points.len() as u32);
             }
-            placed
         });
-        Self {
-            clusters,
-            chunks: chunks.collect(),
-        }
+        Self { clusters, chunks }
     }
 
     /// Box around everything, if all of it is finite.
@@ -81,19 +86,22 @@ pub(super) struct Caster {
 }
 
 /// The casters of a face.
-pub(super) struct Casters {
-    chunks: Vec<Chunk>,
+pub(super) struct Casters<'c> {
+    chunks: &'c [CasterChunk],
 }
 
-#[derive(Default)]
-struct Chunk {
+/// Those of some clusters.
+#[derive(Clone, Debug, Default)]
+pub(super) struct CasterChunk {
     casters: Vec<Caster>,
     /// Where each light tile's references start, and the end.
     starts: Vec<u32>,
     references: Vec<u32>,
+    /// Light tile and caster of each, before they are sorted.
+    pairs: Vec<(u32, u32)>,
 }
 
-impl Casters {
+impl Casters<'_> {
     /// The casters of a light tile of the face.
     pub(super) fn of_tile(&self, tile: usize) -> impl Iterator<Item = &Caster> {
         self.chunks.iter().flat_map(move |chunk| {
@@ -105,10 +113,33 @@ impl Casters {
     }
 
     pub(super) fn bytes(&self) -> usize {
-        let bytes = |c: &Chunk| {
-            c.casters.capacity() * size_of::<Caster>() + (c.starts.capacity() + c.references.capacity()) * 4
+        let bytes = |c: &CasterChunk| {
+            c.casters.capacity() * size_of::<Caster>()
+                + (c.starts.capacity() + c.references.capacity() + 2 * c.pairs.capacity()) * 4
         };
         self.chunks.iter().map(bytes).sum()
+    }
+}
+
+impl CasterChunk {
+    /// A counting sort of the pairs by light tile.
+    fn sort(&mut self, tiles: usize) {
+        self.starts.clear();
+        self.starts.resize(tiles + 2, 0);
+        for &(tile, _) in &self.pairs {
+            self.starts[tile as usize + 2] += 1;
+        }
+        for i in 1..self.starts.len() {
+            self.starts[i] += self.starts[i - 1];
+        }
+        self.references.clear();
+        self.references.resize(self.pairs.len(), 0);
+        // Each start becomes the next one's while its references are put down.
+        for &(tile, caster) in &self.pairs {
+            let slot = &mut self.starts[tile as usize + 1];
+            self.references[*slot as usize] = caster;
+            *slot += 1;
+        }
     }
 }
 
@@ -118,24 +149,24 @@ struct Finder<'f> {
     /// Per light tile, the nearness of the farthest receiver.
     farthest: &'f [f32],
     tiles: u32,
-    casters: Vec<Caster>,
-    /// Light tile and caster.
-    pairs: Vec<(u32, u32)>,
+    found: &'f mut CasterChunk,
 }
 
 impl FaceScene<'_> {
-    /// Finds the casters of a face.
-    pub(super) fn find_casters(&self, farthest: &[f32]) -> Casters {
+    /// Finds the casters of a face; they are kept in `chunks`, whatever these held.
+    pub(super) fn find_casters<'c>(&self, farthest: &[f32], chunks: &'c mut Vec<CasterChunk>) -> Casters<'c> {
         let placed = self.placed;
         let tiles = self.view.width / LIGHT_TILE;
-        let chunks = placed.chunks.par_iter().enumerate();
-        let chunks = chunks.map_init(CasterLanes::default, |lanes, (i, chunk)| {
+        chunks.resize_with(placed.chunks.len(), CasterChunk::default);
+        let both = placed.chunks.par_iter().zip(&mut *chunks).enumerate();
+        both.for_each_init(CasterLanes::default, |lanes, (i, (chunk, found))| {
+            found.casters.clear();
+            found.pairs.clear();
             let mut finder = Finder {
                 scene: self,
                 farthest,
                 tiles,
-                casters: Vec::new(),
-                pairs: Vec::new(),
+                found,
             };
             let mut start = 0;
             for (k, (place, &end)) in chunk.boxes.iter().zip(&chunk.ends).enumerate() {
@@ -145,11 +176,9 @@ impl FaceScene<'_> {
                     finder.take_cluster(i * CHUNK + k, points, lanes);
                 }
             }
-            finder.sorted()
+            finder.found.sort(farthest.len());
         });
-        Casters {
-            chunks: chunks.collect(),
-        }
+        Casters { chunks }
     }
 }
 
@@ -283,47 +312,25 @@ impl Finder<'_> {
     #[inline]
     fn pair(&mut self, tile: u32, nearest: f32) {
         if asked_before(nearest, self.farthest[tile as usize]) {
-            self.pairs.push((tile, self.casters.len() as u32));
+            self.found.pairs.push((tile, self.found.casters.len() as u32));
         }
     }
 
     /// Notes the caster whose pairs were found.
     #[inline]
     fn keep(&mut self, batch: &CasterBatch, lane: usize, prim: u32) {
-        if self.pairs.last().is_none_or(|p| p.1 != self.casters.len() as u32) {
+        let next = self.found.casters.len() as u32;
+        if self.found.pairs.last().is_none_or(|p| p.1 != next) {
             return;
         }
         let of = |v: &[[f32; LANES]; 3]| [v[0][lane], v[1][lane], v[2][lane]];
         let corners = &batch.corners;
-        self.casters.push(Caster {
+        self.found.casters.push(Caster {
             x: of(&corners.x),
             y: of(&corners.y),
             nearness: of(&corners.nearness),
             prim,
         });
-    }
-
-    fn sorted(self) -> Chunk {
-        let count = self.farthest.len();
-        let mut starts = vec![0u32; count + 1];
-        for &(tile, _) in &self.pairs {
-            starts[tile as usize + 1] += 1;
-        }
-        for i in 0..count {
-            starts[i + 1] += starts[i];
-        }
-        let mut next = starts.clone();
-        let mut references = vec![0; self.pairs.len()];
-        for &(tile, caster) in &self.pairs {
-            let slot = &mut next[tile as usize];
-            references[*slot as usize] = caster;
-            *slot += 1;
-        }
-        Chunk {
-            casters: self.casters,
-            starts,
-            references,
-        }
     }
 }
 

@@ -36,8 +36,11 @@ impl Part {
 
     /// A counting sort of entries into light tiles.
     fn sort(&mut self, entries: &[Entry], tiles: usize) {
+        self.starts.clear();
         self.starts.resize(tiles + 1, 0);
+        self.farthest.clear();
         self.farthest.resize(tiles, f32::INFINITY);
+        self.entries.clear();
         for entry in entries {
             let tile = entry.light_tile as usize;
             self.starts[tile + 1] += 1;
@@ -81,17 +84,22 @@ struct GatherWork {
     entries: Vec<Entry>,
 }
 
-/// Finds the receivers of all tiles. There are so many light tiles in all faces together.
+/// Finds the receivers of all tiles; they are kept in `parts`, whatever these held. There are so many light tiles in
+/// all faces together.
 pub(super) fn gather(
     visibility: &Visibility,
     triangles: &Triangles,
     query: &LightQuery,
     (faces, light_tiles): (&LightFaces, usize),
     level: SimdLevel,
-) -> Vec<Part> {
-    let part_of = |work: &mut GatherWork, (index, tiles): (usize, &[VisibleTile])| {
-        let mut part = Part::default();
-        part.points.reserve(tiles.iter().map(|t| t.prims.len()).sum());
+    parts: &mut Vec<Part>,
+) {
+    let tiles = visibility.tiles();
+    parts.resize_with(tiles.len().div_ceil(PART), Part::default);
+    let both = parts.par_iter_mut().zip(tiles.par_chunks(PART)).enumerate();
+    both.for_each_init(GatherWork::default, |work, (index, (part, tiles))| {
+        part.points.clear();
+        part.asked.clear();
         work.entries.clear();
         for (i, tile) in tiles.iter().enumerate() {
             work.find_spans(visibility, triangles, query, tile, level);
@@ -112,10 +120,7 @@ pub(super) fn gather(
         let held: u64 = work.entries.iter().map(|e| pixels(&e.lanes)).sum();
         part.undisturbed = part.receivers - held;
         part.sort(&work.entries, light_tiles);
-        part
-    };
-    let parts = visibility.tiles().par_chunks(PART).enumerate();
-    parts.map_init(GatherWork::default, part_of).collect()
+    });
 }
 
 impl GatherWork {

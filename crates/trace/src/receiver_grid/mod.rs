@@ -31,7 +31,7 @@ use crate::view::View;
 use crate::visibility::place;
 use crate::{CastRule, Clusters, Cone, Light, Triangles, Visibility, exact};
 
-use casters::PlacedClusters;
+use casters::{CasterChunk, PlacedChunk, PlacedClusters};
 use gather::Part;
 use light_tile::LightTileWork;
 
@@ -67,6 +67,14 @@ pub struct LitCounts {
     pub bytes: usize,
 }
 
+/// Working memory, kept from light to light and frame to frame.
+#[derive(Clone, Debug, Default)]
+pub struct LitScratch {
+    parts: Vec<Part>,
+    placed: Vec<PlacedChunk>,
+    casters: Vec<CasterChunk>,
+}
+
 /// What is asked of a light.
 #[derive(Clone, Copy)]
 pub struct LightQuery<'q> {
@@ -100,13 +108,19 @@ impl LitPixels {
         clusters: &Clusters,
         query: &LightQuery,
         level: SimdLevel,
+        scratch: &mut LitScratch,
     ) -> Self {
         assert_eq!(
             clusters.triangle_count(),
             triangles.len(),
             "clusters of other triangles"
         );
-        let placed = PlacedClusters::new(clusters, triangles);
+        let LitScratch {
+            parts,
+            placed,
+            casters,
+        } = scratch;
+        let placed = PlacedClusters::new(clusters, triangles, placed);
         let bounds = placed.bounds();
         let Some(mut faces) = crate::light_views::views(&query.light, triangles, query.cone, bounds) else {
             return Self::one_by_one(visibility, triangles, query);
@@ -119,7 +133,8 @@ impl LitPixels {
             *view = view.window([0.0; 2], size, [tiles * LIGHT_TILE; 2]);
         }
         let light_tiles = faces.views.len() * (tiles * tiles) as usize;
-        let parts = gather::gather(visibility, triangles, query, (&faces, light_tiles), level);
+        gather::gather(visibility, triangles, query, (&faces, light_tiles), level, parts);
+        let parts: &[Part] = parts;
         let points: Vec<&[BlockPoints]> = parts.iter().map(|part| &part.points[..]).collect();
         let lit: Vec<Vec<AtomicU16>> = parts
             .iter()
@@ -138,7 +153,7 @@ impl LitPixels {
                 visibility,
                 triangles,
                 query,
-                parts: &parts,
+                parts,
                 points: &points,
                 lit: &lit,
                 view: &faces.views[face],
@@ -146,7 +161,7 @@ impl LitPixels {
                 placed: &placed,
                 level,
             };
-            of_a_face = scene.draw(&mut counts).max(of_a_face);
+            of_a_face = scene.draw(&mut counts, casters).max(of_a_face);
         }
         counts.bytes += placed.bytes() + of_a_face;
         let strides = visibility.tiles().iter().map(|tile| tile.stride);
@@ -248,7 +263,7 @@ struct FaceScene<'f> {
 
 impl FaceScene<'_> {
     /// Draws all casters of a face and puts out what they shadow; returns the bytes held at most.
-    fn draw(&self, counts: &mut LitCounts) -> usize {
+    fn draw(&self, counts: &mut LitCounts, chunks: &mut Vec<CasterChunk>) -> usize {
         let tiles = self.view.width / LIGHT_TILE;
         let first = (self.face * tiles * tiles) as usize;
         let mut farthest = vec![f32::INFINITY; (tiles * tiles) as usize];
@@ -263,7 +278,8 @@ impl FaceScene<'_> {
         if asked.is_empty() {
             return 0;
         }
-        let (casters, rounding) = (self.find_casters(&farthest), self.view.rounding() as f32);
+        let casters = self.find_casters(&farthest, chunks);
+        let rounding = self.view.rounding() as f32;
         let drawn: Vec<_> = asked
             .par_iter()
             .map_init(LightTileWork::default, |work, &tile| {

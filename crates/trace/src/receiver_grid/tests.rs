@@ -39,11 +39,11 @@ fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
     let triangles = mesh.triangles();
     let expected = reference(&triangles, &view, query);
     let clusters = Clusters::new(&triangles);
-    let mut counts = LitCounts::default();
+    let (mut counts, mut scratch) = (LitCounts::default(), LitScratch::default());
     for level in SimdLevel::available() {
         let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
         let visibility = Visibility::trace(&grid, &|| ());
-        let lit = LitPixels::find(&visibility, &triangles, &clusters, query, level);
+        let lit = LitPixels::find(&visibility, &triangles, &clusters, query, level, &mut scratch);
         for index in 0..grid.tile_count() {
             let tile = grid.tile(index);
             for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
@@ -209,11 +209,20 @@ fn a_spot_lights_cone_is_one_face() {
         ..query(Light::Point(position), &view, BOTH)
     };
     let half_angle = 0.5;
+    let mut scratch = LitScratch::default();
     let level = SimdLevel::detect();
     let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
     let visibility = Visibility::trace(&grid, &|| ());
-    let [all, within] = [None, Some(Cone { axis, half_angle })]
-        .map(|cone| LitPixels::find(&visibility, &triangles, &clusters, &with(cone), level));
+    let [all, within] = [None, Some(Cone { axis, half_angle })].map(|cone| {
+        LitPixels::find(
+            &visibility,
+            &triangles,
+            &clusters,
+            &with(cone),
+            level,
+            &mut scratch,
+        )
+    });
     let mut compared = 0;
     for (index, tile) in visibility.tiles().iter().enumerate() {
         for (x, y) in (0..tile.tile.height).flat_map(|y| (0..tile.tile.width).map(move |x| (x, y))) {
@@ -246,11 +255,11 @@ fn any_number_of_threads_gives_the_same() {
             .build()
             .expect("a pool");
         pool.install(|| {
-            let level = SimdLevel::detect();
+            let (level, mut scratch) = (SimdLevel::detect(), LitScratch::default());
             let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
             let visibility = Visibility::trace(&grid, &|| ());
             let query = query(Light::Point(Vec3::new(0.1, 0.2, 0.3)), &view, BOTH);
-            let lit = LitPixels::find(&visibility, &triangles, &clusters, &query, level);
+            let lit = LitPixels::find(&visibility, &triangles, &clusters, &query, level, &mut scratch);
             let bits: Vec<_> = lit.tiles.into_iter().map(|t| t.lit).collect();
             (bits, lit.counts)
         })
