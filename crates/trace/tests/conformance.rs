@@ -225,6 +225,7 @@ fn rays_that_leave_a_surface_meet_the_same_triangle() {
         let seed = 900 + k as u64;
         let brute = BruteForce::new(mesh.triangles());
         let bvh = Bvh::build(mesh.triangles());
+        let ldc = Ldc::build(mesh.triangles(), &LdcOptions::default());
         let mut random = Random::new(seed);
         for mut from in receivers(mesh, seed, 400) {
             let directions = [
@@ -240,6 +241,12 @@ fn rays_that_leave_a_surface_meet_the_same_triangle() {
                     let ray = SurfaceRay { from, dir };
                     let found = bvh.after(&ray, &mut ());
                     assert_eq!(found, brute.after(&ray), "{}, seed {seed}: {ray:?}", mesh.name);
+                    let in_cube = ldc.after(&ray, &mut ());
+                    assert_eq!(in_cube, found, "cube, {}, seed {seed}: {ray:?}", mesh.name);
+                    let (mut all, mut others) = (Vec::new(), Vec::new());
+                    bvh.along(&ray.line(), &mut (), &mut all);
+                    ldc.along(&ray.line(), &mut (), &mut others);
+                    assert_eq!(all, others, "{}, seed {seed}: {ray:?}", mesh.name);
                 }
             }
         }

@@ -23,6 +23,7 @@ mod levels;
 mod raster;
 mod sampled;
 mod samples;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod walk;
@@ -39,7 +40,7 @@ pub use samples::{DepthFormat, TexelSample};
 pub use walk::{StepCounts, Steps};
 
 use crate::brute::{hit_in_range, rounded, write_sorted};
-use crate::exact::{self, ExactHit, Filter};
+use crate::exact::{ExactHit, Filter};
 use crate::{Accel, BuildStats, Hit, Light, Ray, Receiver, Triangles};
 use build::Stack;
 use frame::widened;
@@ -145,6 +146,10 @@ impl Line {
             t_min: f64::from(ray.t_min),
             t_max: f64::from(ray.t_max),
         }
+    }
+
+    fn is_valid(&self) -> bool {
+        self.origin.is_finite() && self.dir.is_finite() && self.dir != DVec3::ZERO
     }
 }
 
@@ -254,37 +259,7 @@ impl<'a> Ldc<'a> {
 
     /// [`Accel::shadowed`], counting the work.
     pub fn shadows(&self, receiver: &Receiver, light: &Light, steps: &mut impl Steps) -> bool {
-        // The same origins, directions and ranges as the hierarchy's, for the same reasons.
-        let beyond = if receiver.error >= 0.0 { 0.0 } else { f64::INFINITY };
-        let line = match *light {
-            Light::Point(position) => Line {
-                origin: position.as_dvec3(),
-                dir: receiver.point - position.as_dvec3(),
-                t_min: 0.0,
-                t_max: 1.0 + beyond,
-            },
-            Light::Directional(direction) => Line {
-                origin: receiver.point,
-                dir: direction.as_dvec3(),
-                t_min: -beyond,
-                t_max: f64::INFINITY,
-            },
-        };
-        let valid = line.origin.is_finite() && line.dir.is_finite() && line.dir != DVec3::ZERO;
-        let filter = Filter::new(line.origin, line.dir);
-        let mut found = false;
-        let mut seen = Mailbox::default();
-        self.candidates(valid, &line, steps, |prim, _| {
-            found = seen.first(prim)
-                && !filter.certain_miss(&self.triangles.corners(prim))
-                && exact::shadows(&self.triangles, prim, receiver, light);
-            if found {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
-        found
+        self.each_shadow(receiver, light, steps, |_| ControlFlow::Break(()))
     }
 
     /// Calls `visit` with every triangle that the line may meet, some more than once, until it breaks. `visit` may
