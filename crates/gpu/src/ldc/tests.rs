@@ -6,7 +6,9 @@ use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec3};
 use rayward_trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, TexelSample};
-use rayward_trace::{Accel, BruteForce, Hit, Ldc, LdcOptions, Light, Ray, Receiver, Triangles};
+use rayward_trace::{
+    Accel, BruteForce, Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, SurfaceRay, Triangles,
+};
 
 use super::{Cube, CubeOptions};
 use crate::{Error, Gpu};
@@ -346,6 +348,34 @@ fn shadows_are_those_of_brute_force() {
             queries.len()
         );
         assert!(stats.unsure < queries.len() / 3, "{stats:?}");
+    }
+}
+
+#[test]
+fn rays_that_leave_surfaces_meet_what_brute_force_does() {
+    let Some(gpu) = gpu() else { return };
+    for (k, mesh) in meshes().iter().enumerate() {
+        let (brute, bvh) = (BruteForce::new(mesh.triangles()), Bvh::build(mesh.triangles()));
+        let cube = built(&gpu, mesh, &CubeOptions::default());
+        let mut numbers = Numbers(23);
+        let leaving: Vec<SurfaceRay> = rays(8, 3000)
+            .iter()
+            .filter_map(|ray| {
+                let (prim, hit) = brute.closest(ray)?;
+                Some(SurfaceRay {
+                    from: Receiver::on_surface(ray, hit.t, prim),
+                    dir: numbers.point(),
+                })
+            })
+            .collect();
+        let (hits, stats) = cube.after(&leaving, &bvh).unwrap_or_else(|e| panic!("{e}"));
+        for (ray, hit) in leaving.iter().zip(&hits) {
+            assert_eq!(*hit, brute.after(ray), "{ray:?}");
+        }
+        let count = hits.iter().flatten().count();
+        assert!(count > 100, "{count} of {}", leaving.len());
+        // The last mesh has triangles within others, where nothing is certain.
+        assert!(k == 2 || stats.unsure < leaving.len() / 5, "{stats:?}");
     }
 }
 

@@ -6,8 +6,9 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
+use rayward_trace::exact::{self, ExactHit};
 use rayward_trace::ldc::{Clipped, HitTest, StepCounts};
-use rayward_trace::{Accel, Hit, Light, Ray, Receiver, exact};
+use rayward_trace::{Accel, Bvh, Hit, Light, Ray, Receiver, SurfaceRay};
 
 use super::layout::{Found, Query, TexelRay};
 use super::shaders::{EXACT, Program, SAMPLED};
@@ -40,6 +41,18 @@ impl Line {
             range: [f64::from(ray.t_min), f64::from(ray.t_max)],
             skip: u32::MAX,
             valid: ray.is_valid(),
+        }
+    }
+
+    /// The line that [`SurfaceRay::meets`] tests.
+    fn after(ray: &SurfaceRay) -> Self {
+        let (origin, dir) = (ray.from.point, ray.dir.as_dvec3());
+        Self {
+            origin,
+            dir,
+            range: [ray.from.error / dir.length(), f64::INFINITY],
+            skip: ray.from.prim,
+            valid: origin.is_finite() && dir.is_finite() && dir != DVec3::ZERO,
         }
     }
 
@@ -124,6 +137,35 @@ impl Cube<'_> {
             .map(|i| match self.certain(&answers, i) {
                 UNSURE => cpu.intersect(&rays[i]),
                 HIT => self.hit(&rays[i], answers.found[i].prim),
+                _ => None,
+            })
+            .collect();
+        Ok((hits, self.stats_of(&answers)))
+    }
+
+    /// The first triangles that rays meet after they left their surfaces: [`Bvh::after`] of arrays, bit for bit.
+    pub fn after(
+        &self,
+        rays: &[SurfaceRay],
+        cpu: &Bvh,
+    ) -> Result<(Vec<Option<(u32, ExactHit)>>, TraceStats)> {
+        let answers = self.trace(
+            rays.len(),
+            |i| Line::after(&rays[i]),
+            &EXACT,
+            "trace_exact",
+            QUERY,
+        )?;
+        let hits = (0..rays.len())
+            .into_par_iter()
+            .map(|i| match self.certain(&answers, i) {
+                UNSURE => cpu.after(&rays[i], &mut ()),
+                HIT => {
+                    let prim = answers.found[i].prim;
+                    let (origin, dir) = (rays[i].from.point, rays[i].dir.as_dvec3());
+                    let hit = exact::attributes(origin, dir, self.triangles.corners(prim))?;
+                    Some((prim, hit))
+                }
                 _ => None,
             })
             .collect();
