@@ -8,6 +8,7 @@ use serde::Serialize;
 
 use crate::args::DoctorArgs;
 use crate::failure::{Code, Failure};
+use crate::gpu::{self, GpuFindings};
 use crate::machine;
 use crate::report;
 
@@ -27,6 +28,7 @@ struct Findings {
     memory_available_bytes: Option<u64>,
     /// Whether the same picture came out at every instruction set.
     self_test: bool,
+    gpu: GpuFindings,
     missing: Vec<&'static str>,
 }
 
@@ -45,6 +47,7 @@ pub(crate) fn run(args: &DoctorArgs) -> Result<(), Failure> {
         memory_bytes: machine::total_memory(),
         memory_available_bytes: machine::available_memory(),
         self_test: self_test(&levels)?,
+        gpu: gpu::findings(),
         missing: missing(best),
     };
     if args.json {
@@ -124,6 +127,7 @@ impl Findings {
                 }
             ),
         ];
+        lines.extend(self.gpu.lines());
         if self.missing.is_empty() {
             lines.push("missing     nothing that this build uses".into());
         }

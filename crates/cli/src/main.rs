@@ -9,6 +9,7 @@ mod bench;
 mod compare;
 mod doctor;
 mod failure;
+mod gpu;
 mod info;
 mod input;
 mod interrupt;

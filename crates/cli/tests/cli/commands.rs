@@ -2,7 +2,7 @@
 
 use std::process::Stdio;
 
-use crate::support::Folder;
+use crate::support::{Folder, Run};
 
 #[test]
 fn info_tells_what_is_in_a_scene() {
@@ -139,6 +139,24 @@ fn doctor_finds_this_machine_sound() {
     assert!(json["threads"].as_u64().is_some_and(|threads| threads > 0));
     let levels = json["simd_levels"].as_array().expect("levels");
     assert!(levels.contains(&json["simd"]));
+    let gpu = &json["gpu"];
+    let (used, off) = (gpu["used"].as_str(), gpu["off"].as_str());
+    assert!(used.is_some() != off.is_some(), "{gpu}");
+    if let Some(used) = used {
+        let adapters = gpu["adapters"].as_array().expect("adapters");
+        assert!(adapters.iter().any(|a| a["name"] == used), "{gpu}");
+    }
+    if cfg!(target_os = "linux") {
+        let output = folder
+            .command(&["doctor", "--json"])
+            .env("VK_DRIVER_FILES", "/nowhere.json")
+            .env("VK_ICD_FILENAMES", "/nowhere.json")
+            .output()
+            .expect("the program runs");
+        let without = Run::from(output).expect(0).json();
+        let off = without["gpu"]["off"].as_str().expect("a reason");
+        assert!(off.contains("no GPU"), "{off}");
+    }
     folder.run(&["doctor"]).expect(0);
 }
 
