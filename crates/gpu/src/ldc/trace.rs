@@ -23,6 +23,9 @@ const UNSURE: u32 = 2;
 /// Stands for no end in a shader.
 const FAR: f64 = 1e30;
 
+/// The first triangle that a ray meets, and where.
+type SurfaceHit = Option<(u32, ExactHit)>;
+
 /// A line whose triangles are asked for.
 #[derive(Clone, Copy, Debug)]
 struct Line {
@@ -144,11 +147,7 @@ impl Cube<'_> {
     }
 
     /// The first triangles that rays meet after they left their surfaces: [`Bvh::after`] of arrays, bit for bit.
-    pub fn after(
-        &self,
-        rays: &[SurfaceRay],
-        cpu: &Bvh,
-    ) -> Result<(Vec<Option<(u32, ExactHit)>>, TraceStats)> {
+    pub fn after(&self, rays: &[SurfaceRay], cpu: &Bvh) -> Result<(Vec<SurfaceHit>, TraceStats)> {
         let answers = self.trace(
             rays.len(),
             |i| Line::after(&rays[i]),
