@@ -1,6 +1,7 @@
 //! Energy: what a surface reflects under a sky of radiance 1 is its albedo, known in closed form or bounded.
 
 use glam::{DVec3, Vec3};
+use rayward::shade::{brdf, lobes};
 use rayward::{ShadingLight, Surface, shade};
 use rayward_scene::{LightKind, PosedLight};
 
@@ -17,6 +18,10 @@ fn surface(angle: f32, metallic: f32, roughness: f32) -> Surface {
         roughness,
         f0: Vec3::splat(0.04),
         specular: 1.0,
+        transmission: 0.0,
+        ior: 1.5,
+        thin: true,
+        absorption: Vec3::ZERO,
         emissive: Vec3::ZERO,
         occlusion: 1.0,
         unlit: false,
@@ -102,4 +107,130 @@ fn a_rough_white_metal_loses_what_is_known() {
     // At alpha 1, seen head on, D = 1 / pi and V = 1 / (2 (1 + cos)), which integrates to 1 - ln 2.
     let got = reflected(&surface(0.0, 1.0, 1.0));
     assert!((got - (1.0 - 2f32.ln())).abs() < 1e-4, "{got}");
+}
+
+/// Evenly spread pairs of random numbers.
+fn pairs(side: u16) -> impl Iterator<Item = [f32; 2]> {
+    let middle = move |i: u16| (f32::from(i) + 0.5) / f32::from(side);
+    (0..side).flat_map(move |i| (0..side).map(move |j| [middle(i), middle(j)]))
+}
+
+/// Mean of a function of directions over the hemisphere, times its solid angle and the cosine.
+fn over_hemisphere(value: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    const N: u16 = 600;
+    let sum: DVec3 = pairs(N)
+        .map(|[height, azimuth]| {
+            let radius = (1.0 - height * height).sqrt();
+            let (sin, cos) = (azimuth * std::f32::consts::TAU).sin_cos();
+            (value(Vec3::new(radius * cos, radius * sin, height)) * height).as_dvec3()
+        })
+        .sum();
+    (sum * (std::f64::consts::TAU / f64::from(N) / f64::from(N))).as_vec3()
+}
+
+#[test]
+fn drawn_reflections_bring_what_the_model_reflects() {
+    for (roughness, metallic) in [(0.3, 1.0), (0.6, 0.0), (1.0, 0.5)] {
+        for angle in [0.0f32, 0.8, 1.3] {
+            let mut surface = surface(angle, metallic, roughness);
+            surface.base_color = Vec3::new(0.9, 0.5, 0.1);
+            let exact = over_hemisphere(|towards| brdf::specular(&surface, towards));
+            let mut drawn = Vec3::ZERO;
+            for random in pairs(256) {
+                if let Some(lobe) = lobes::reflected(&surface, random) {
+                    drawn += lobe.weight / 65536.0;
+                    // A weight is the model times the cosine over the density.
+                    let model = brdf::specular(&surface, lobe.towards) * lobe.towards.z / lobe.density;
+                    assert!(
+                        (model - lobe.weight).abs().max_element() < 2e-2 * lobe.weight.max_element() + 1e-4
+                    );
+                }
+            }
+            assert!(
+                (drawn - exact).abs().max_element() < 0.01,
+                "{drawn} {exact} at {roughness}, {angle}"
+            );
+            let whole = over_hemisphere(|towards| {
+                Vec3::splat(lobes::reflection_density(&surface, towards) / towards.z)
+            });
+            assert!(whole.x < 1.01, "a density is no more than 1 in all: {whole}");
+        }
+    }
+}
+
+#[test]
+fn drawn_diffusion_brings_what_the_model_diffuses() {
+    let mut matte = surface(0.7, 0.2, 0.9);
+    matte.base_color = Vec3::new(0.9, 0.5, 0.1);
+    let exact = over_hemisphere(|towards| brdf::diffuse(&matte, towards));
+    let drawn: Vec3 = pairs(256)
+        .filter_map(|random| lobes::diffused(&matte, random))
+        .map(|lobe| lobe.weight / 65536.0)
+        .sum();
+    assert!((drawn - exact).abs().max_element() < 2e-3, "{drawn} {exact}");
+}
+
+/// Clear glass seen from an angle, from outside or from within.
+fn glass(angle: f32, front: bool) -> Surface {
+    Surface {
+        transmission: 1.0,
+        thin: false,
+        front,
+        ..surface(angle, 0.0, 0.0)
+    }
+}
+
+#[test]
+fn glass_bends_light_by_snell_and_loses_none() {
+    for (angle, front) in [
+        (0.0f32, true),
+        (0.6, true),
+        (1.4, true),
+        (0.3, false),
+        (0.7, false),
+    ] {
+        let glass = glass(angle, front);
+        let through = lobes::transmitted(&glass, [0.5; 2]).expect("below the critical angle");
+        let back = lobes::reflected(&glass, [0.5; 2]).expect("a mirror always reflects");
+        assert!((through.weight + back.weight - Vec3::ONE).abs().max_element() < 1e-5);
+        let ratio = if front { 1.0 / 1.5 } else { 1.5 };
+        let sin = through.towards.x.hypot(through.towards.y);
+        assert!(
+            (sin - angle.sin() * ratio).abs() < 1e-5 && through.towards.z < 0.0,
+            "{through:?}"
+        );
+    }
+    // Head on 4 %, and Fresnel's value at 60 degrees for 1.5.
+    assert!((lobes::reflected(&glass(0.0, true), [0.5; 2]).unwrap().weight.x - 0.04).abs() < 1e-5);
+    let slanted = lobes::reflected(&glass(std::f32::consts::FRAC_PI_3, true), [0.5; 2]).unwrap();
+    assert!((slanted.weight.x - 0.089_2).abs() < 1e-4, "{slanted:?}");
+}
+
+#[test]
+fn glass_reflects_all_beyond_the_critical_angle() {
+    let within = glass(0.8, false);
+    assert_eq!(lobes::transmitted(&within, [0.5; 2]), None);
+    assert_eq!(lobes::reflected(&within, [0.5; 2]).unwrap().weight, Vec3::ONE);
+}
+
+#[test]
+fn thin_walls_are_passed_straight() {
+    let mut wall = glass(0.9, false);
+    wall.thin = true;
+    wall.base_color = Vec3::new(1.0, 0.5, 0.25);
+    let through = lobes::transmitted(&wall, [0.5; 2]).unwrap();
+    assert_eq!(through.towards, -wall.view);
+    assert!((through.weight.x / through.weight.y - 2.0).abs() < 1e-6);
+    // A frosted one spreads the same light about that direction.
+    wall.roughness = 0.3;
+    let spread: Vec<_> = pairs(64)
+        .filter_map(|random| lobes::transmitted(&wall, random))
+        .collect();
+    let mean = spread.iter().map(|lobe| lobe.towards).sum::<Vec3>().normalize();
+    assert!(mean.dot(-wall.view) > 0.97, "{mean}");
+    assert!(
+        spread
+            .iter()
+            .all(|lobe| lobe.towards.z < 0.0 && lobe.weight.x <= 1.0)
+    );
 }

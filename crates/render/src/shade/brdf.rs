@@ -1,5 +1,6 @@
-//! The metallic-roughness model of the glTF 2.0 specification, appendix B, with `KHR_materials_ior` and
-//! `KHR_materials_specular`.
+//! The metallic-roughness model of the glTF 2.0 specification, appendix B, with `KHR_materials_ior`,
+//! `KHR_materials_specular` and, for what is reflected, `KHR_materials_transmission`: a transmitting surface
+//! reflects by Fresnel's equations instead of Schlick's approximation and diffuses what it does not transmit.
 //!
 //! ```text
 //! f     = mix(dielectric, metal, metallic)
@@ -24,28 +25,82 @@ pub const MIN_ALPHA: f32 = 1e-3;
 /// The BRDF for light from the unit direction `towards`, per steradian, without the cosine.
 #[inline]
 pub fn evaluate(surface: &Surface, towards: Vec3) -> Vec3 {
+    diffuse(surface, towards) + specular(surface, towards)
+}
+
+/// The diffuse part of [`evaluate`].
+#[inline]
+pub fn diffuse(surface: &Surface, towards: Vec3) -> Vec3 {
+    let half = (towards + surface.view).normalize_or(surface.normal);
+    let reflected = dielectric_reflectance(surface, surface.view.dot(half));
+    let share = (1.0 - surface.metallic) * (1.0 - surface.transmission) / PI;
+    surface.base_color * ((1.0 - reflected.max_element()).max(0.0) * share)
+}
+
+/// The reflected part of [`evaluate`].
+#[inline]
+pub fn specular(surface: &Surface, towards: Vec3) -> Vec3 {
     let (normal, view) = (surface.normal, surface.view);
     let half = (towards + view).normalize_or(normal);
     let cos_light = normal.dot(towards).max(0.0);
     // Interpolated normals can lean away from the viewer; there the limit of the model goes on.
     let cos_view = normal.dot(view).max(1e-4);
-    let grazing = (1.0 - view.dot(half).abs()).max(0.0);
-    let fresnel = grazing * grazing * (grazing * grazing) * grazing;
-
     let alpha = (surface.roughness * surface.roughness).max(MIN_ALPHA);
     let lobe = distribution(normal, half, alpha) * visibility(cos_light, cos_view, alpha);
+    reflectance(surface, view.dot(half)) * lobe
+}
 
+/// What a facet reflects at this cosine between its normal and the viewer.
+#[inline]
+pub fn reflectance(surface: &Surface, cos: f32) -> Vec3 {
+    let grazing = schlick(cos);
     let base = surface.base_color;
-    let metal = (base + (Vec3::ONE - base) * fresnel) * lobe;
-    let reflected = surface.specular * (surface.f0 + (Vec3::ONE - surface.f0) * fresnel);
-    let dielectric = base * ((1.0 - reflected.max_element()) / PI) + reflected * lobe;
-    dielectric.lerp(metal, surface.metallic)
+    let metal = base + (Vec3::ONE - base) * grazing;
+    dielectric_reflectance(surface, cos).lerp(metal, surface.metallic)
+}
+
+/// What a facet of the dielectric reflects: Schlick's rise from `f0` to 1 or, where light passes, Fresnel's, which
+/// knows total reflection.
+#[inline]
+pub fn dielectric_reflectance(surface: &Surface, cos: f32) -> Vec3 {
+    let rise = if surface.transmission > 0.0 {
+        match fresnel(cos.abs(), surface.relative_ior()) {
+            Some(exact) => {
+                let ratio = (surface.ior - 1.0) / (surface.ior + 1.0);
+                let least = ratio * ratio;
+                ((exact - least) / (1.0 - least)).clamp(0.0, 1.0)
+            }
+            None => return Vec3::ONE,
+        }
+    } else {
+        schlick(cos)
+    };
+    surface.specular * (surface.f0 + (Vec3::ONE - surface.f0) * rise)
+}
+
+/// Fresnel's reflectance of unpolarised light; `ratio` is the index of refraction on the viewer's side over that
+/// behind. `None` at total reflection.
+fn fresnel(cos: f32, ratio: f32) -> Option<f32> {
+    let behind2 = 1.0 - ratio * ratio * (1.0 - cos * cos).max(0.0);
+    if behind2 <= 0.0 {
+        return None;
+    }
+    let behind = behind2.sqrt();
+    let across = (ratio * cos - behind) / (ratio * cos + behind);
+    let along = (cos - ratio * behind) / (cos + ratio * behind);
+    Some(0.5 * (across * across + along * along))
+}
+
+#[inline]
+fn schlick(cos: f32) -> f32 {
+    let grazing = (1.0 - cos.abs()).max(0.0);
+    grazing * grazing * (grazing * grazing) * grazing
 }
 
 /// Trowbridge-Reitz distribution. The usual denominator (n.h)^2 (alpha^2 - 1) + 1 loses all digits at small
 /// alpha; |n x h|^2 is the same as 1 - (n.h)^2 and keeps them.
 #[inline]
-fn distribution(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
+pub(super) fn distribution(normal: Vec3, half: Vec3, alpha: f32) -> f32 {
     let cos = normal.dot(half);
     if cos <= 0.0 {
         return 0.0;

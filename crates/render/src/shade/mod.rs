@@ -5,14 +5,15 @@
 //!                                  --ambient-------> the rest: emission, constant surrounding light
 //! ```
 //!
-//! The model is glTF 2.0's (appendix B), see [`brdf`]; lights are those of `KHR_lights_punctual` in their units.
-//! Lights with a size are sampled ([`direct_from`]); [`direct`] takes them for a point at their middle. Transmission is not shaded: glass looks like the
-//! diffuse base it is coated on.
+//! The model is glTF 2.0's (appendix B), see [`brdf`]; [`lobes`] draws the rays that go on from a surface. Lights are
+//! those of `KHR_lights_punctual` in their units.
+//! Lights with a size are sampled ([`direct_from`]); [`direct`] takes them for a point at their middle.
 //!
 //! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
 
 pub mod brdf;
 mod light;
+pub mod lobes;
 mod surface;
 
 use glam::Vec3;
@@ -56,12 +57,42 @@ fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
     Some(incident)
 }
 
+/// Which lobes of a surface have rays of their own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Traced {
+    /// Reflection.
+    pub reflection: bool,
+    /// Transmission.
+    pub transmission: bool,
+    /// Diffuse light.
+    pub diffusion: bool,
+}
+
 /// Radiance that does not come from a light: emission, and the reflection of a surrounding that has the radiance
 /// `surrounding` in all directions. Metals and dielectrics alike reflect about their base colour of it.
 #[inline]
 pub fn ambient(surface: &Surface, surrounding: Vec3) -> Vec3 {
+    around(surface, surrounding, Traced::default())
+}
+
+/// As [`ambient`], for a surface some of whose lobes are traced and see what is really there.
+#[inline]
+pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
     if surface.unlit {
         return surface.base_color;
     }
-    surface.emissive + surrounding * surface.base_color * surface.occlusion
+    let share = |traced: bool, share: f32| if traced { 0.0 } else { share };
+    let dielectric = 1.0 - surface.metallic;
+    let (through, back) = (
+        dielectric * surface.transmission,
+        dielectric * (1.0 - surface.transmission),
+    );
+    let left = if traced == Traced::default() {
+        1.0
+    } else {
+        share(traced.reflection, surface.metallic)
+            + share(traced.transmission, through)
+            + share(traced.diffusion, back)
+    };
+    surface.emissive + surrounding * surface.base_color * (surface.occlusion * left)
 }

@@ -67,6 +67,14 @@ pub struct Surface {
     pub f0: Vec3,
     /// Weight of the dielectric's reflection.
     pub specular: f32,
+    /// Share of light transmitted instead of diffused.
+    pub transmission: f32,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Whether there is no volume behind: what is transmitted goes straight on.
+    pub thin: bool,
+    /// Absorption of the volume, per metre; zero for clear ones.
+    pub absorption: Vec3,
     /// Emitted radiance.
     pub emissive: Vec3,
     /// Share of the surrounding light that reaches the point.
@@ -75,6 +83,24 @@ pub struct Surface {
     pub unlit: bool,
     /// Whether the viewer is on the front side of the triangle.
     pub front: bool,
+}
+
+impl Surface {
+    /// The index of refraction on the viewer's side over that behind.
+    #[inline]
+    pub fn relative_ior(&self) -> f32 {
+        if self.front || self.thin {
+            1.0 / self.ior
+        } else {
+            self.ior
+        }
+    }
+
+    /// Absorption along a ray that this surface has transmitted: inside of its volume, or outside again.
+    #[inline]
+    pub fn enters_volume(&self) -> bool {
+        self.front && !self.thin
+    }
 }
 
 /// The materials and textures of a scene, prepared once for all of its frames.
@@ -95,6 +121,10 @@ struct ShaderMaterial {
     ior_reflectance: f32,
     specular: f32,
     specular_color: Vec3,
+    transmission: f32,
+    ior: f32,
+    thin: bool,
+    absorption: Vec3,
     normal_scale: f32,
     occlusion_strength: f32,
     alpha_mode: AlphaMode,
@@ -107,10 +137,11 @@ struct ShaderMaterial {
     emissive_texture: Option<Texture>,
     specular_texture: Option<Texture>,
     specular_color_texture: Option<Texture>,
+    transmission_texture: Option<Texture>,
 }
 
 /// The texture references of a material that shading uses, with their encodings.
-fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 7] {
+fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 8] {
     [
         (material.base_color_texture, Encoding::Srgb),
         (material.metallic_roughness_texture, Encoding::Linear),
@@ -119,7 +150,20 @@ fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 7] {
         (material.emissive_texture, Encoding::Srgb),
         (material.specular_texture, Encoding::Linear),
         (material.specular_color_texture, Encoding::Srgb),
+        (material.transmission_texture, Encoding::Linear),
     ]
+}
+
+/// Absorption per metre that leaves `attenuation_color` of white light after `attenuation_distance`
+/// (`KHR_materials_volume`).
+fn absorption(material: &Material) -> Vec3 {
+    // A colour of exactly 0 would need infinite absorption; this leaves less than a millionth.
+    let left = material.attenuation_color.clamp(Vec3::splat(1e-6), Vec3::ONE);
+    if material.thickness > 0.0 && material.attenuation_distance > 0.0 {
+        -Vec3::new(left.x.ln(), left.y.ln(), left.z.ln()) / material.attenuation_distance
+    } else {
+        Vec3::ZERO
+    }
 }
 
 impl ShaderMaterial {
@@ -135,6 +179,10 @@ impl ShaderMaterial {
             ior_reflectance: ratio * ratio,
             specular: material.specular,
             specular_color: material.specular_color,
+            transmission: material.transmission,
+            ior: material.ior,
+            thin: material.thickness <= 0.0,
+            absorption: absorption(material),
             normal_scale: material.normal_scale,
             occlusion_strength: material.occlusion_strength,
             alpha_mode: material.alpha_mode,
@@ -147,6 +195,7 @@ impl ShaderMaterial {
             emissive_texture: resolved[4],
             specular_texture: resolved[5],
             specular_color_texture: resolved[6],
+            transmission_texture: resolved[7],
         }
     }
 
@@ -283,6 +332,11 @@ impl<'s> Shader<'s> {
         }
     }
 
+    /// Whether an object's material covers all it is seen through, whatever its alpha.
+    pub fn is_opaque(&self, geometry: &FrameGeometry, object: u32) -> bool {
+        self.material(geometry, object).alpha_mode == AlphaMode::Opaque
+    }
+
     /// The surface at a point.
     ///
     /// # Panics
@@ -320,6 +374,9 @@ impl<'s> Shader<'s> {
             .get(&material.specular_color_texture)
             .unwrap_or(Vec4::ONE)
             .xyz();
+        let transmission = lookup
+            .get(&material.transmission_texture)
+            .map_or(1.0, |texel| texel.x);
         Surface {
             position: positions[0] + edges[0] * point.u + edges[1] * point.v,
             geometric_normal,
@@ -338,6 +395,10 @@ impl<'s> Shader<'s> {
             roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
             f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
             specular: material.specular * specular,
+            transmission: material.transmission * transmission,
+            ior: material.ior,
+            thin: material.thin,
+            absorption: material.absorption,
             emissive: material.emissive * emission,
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             unlit: material.unlit,

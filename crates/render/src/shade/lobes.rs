@@ -1,0 +1,216 @@
+//! The three ways in which light goes on at a surface, as rays are drawn from them: reflected, transmitted and
+//! diffused.
+//!
+//! Reflection draws a microfacet among those that the viewer sees (Heitz, *Sampling the GGX Distribution of
+//! Visible Normals*, JCGT 7(4), 2018), so that its weight is Fresnel's reflectance times the share of facets that
+//! the light sees too. Transmission draws the same facets and passes them by Snell's law: the boundary of a volume
+//! bends the ray, a thin wall (`thickness` 0) lets it through straight, or spread about that where it is rough, as
+//! `KHR_materials_transmission` and `KHR_materials_volume` define it. The base colour tints each passage.
+//!
+//! Below [`SMOOTH`] of roughness a lobe is one direction: no random number changes it, and its density is infinite.
+//!
+//! Limits: rough glass passes what its rays meet, but not the light of points and directions; radiance is not
+//! scaled inside of a volume, which shows only where the camera or a light is in one.
+
+use std::f32::consts::{FRAC_1_PI, TAU};
+
+use glam::{Vec2, Vec3};
+
+use super::Surface;
+use super::brdf::{MIN_ALPHA, reflectance};
+
+/// Roughness below which a surface is a mirror, or clear.
+pub const SMOOTH: f32 = 0.0316;
+
+/// A way on from a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lobe {
+    /// Unit direction in which the ray goes on.
+    pub towards: Vec3,
+    /// What of the radiance from there goes to the viewer.
+    pub weight: Vec3,
+    /// Probability density of the direction, per steradian; infinite if there was no choice.
+    pub density: f32,
+}
+
+/// Where a reflected ray goes on; `None` if the surface takes it up itself.
+pub fn reflected(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
+    let normal = seen_normal(surface);
+    let view = surface.view;
+    if is_smooth(surface) {
+        let mirrored = 2.0 * normal.dot(view) * normal - view;
+        return Some(Lobe {
+            towards: above(mirrored, surface.geometric_normal),
+            weight: reflectance(surface, view.dot(normal)),
+            density: f32::INFINITY,
+        });
+    }
+    let alpha = alpha(surface);
+    let half = visible_facet(normal, view, alpha, random);
+    let towards = 2.0 * half.dot(view) * half - view;
+    let cos_light = normal.dot(towards);
+    if cos_light <= 0.0 || surface.geometric_normal.dot(towards) <= 0.0 {
+        return None;
+    }
+    let weight = reflectance(surface, view.dot(half)) * lit_share(normal.dot(view), cos_light, alpha);
+    Some(Lobe {
+        towards,
+        weight,
+        density: reflection_density(surface, towards),
+    })
+}
+
+/// Density with which [`reflected`] draws a direction; 0 for smooth surfaces, which draw none.
+pub fn reflection_density(surface: &Surface, towards: Vec3) -> f32 {
+    let normal = seen_normal(surface);
+    let (cos_view, cos_light) = (normal.dot(surface.view), normal.dot(towards));
+    if is_smooth(surface) || cos_light <= 0.0 {
+        return 0.0;
+    }
+    let alpha = alpha(surface);
+    let half = (towards + surface.view).normalize_or(normal);
+    // The density of a seen facet over the 4 (v.h) by which reflection spreads directions.
+    super::brdf::distribution(normal, half, alpha) * seen_share(cos_view, alpha) / (4.0 * cos_view)
+}
+
+/// Where a transmitted ray goes on; `None` for a surface that transmits nothing, and where the drawn facet reflects
+/// all. Whether it is inside of a volume then is [`Surface::enters_volume`].
+pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
+    let through = surface.transmission * (1.0 - surface.metallic);
+    if through <= 0.0 {
+        return None;
+    }
+    let normal = seen_normal(surface);
+    let view = surface.view;
+    let smooth = is_smooth(surface);
+    let half = if smooth {
+        normal
+    } else {
+        visible_facet(normal, view, alpha(surface), random)
+    };
+    let cos = view.dot(half);
+    let passed = Vec3::ONE - super::brdf::dielectric_reflectance(surface, cos).min(Vec3::ONE);
+    let towards = if surface.thin {
+        let reflected = 2.0 * cos * half - view;
+        // A smooth wall is straight to the last bit, so that what lies behind is seen undistorted.
+        if smooth {
+            -view
+        } else {
+            reflected - 2.0 * reflected.dot(normal) * normal
+        }
+    } else {
+        refracted(view, half, surface.relative_ior())?
+    };
+    let cos_light = -normal.dot(towards);
+    if cos_light <= 0.0 {
+        return None;
+    }
+    let shadowed = if smooth {
+        1.0
+    } else {
+        lit_share(normal.dot(view), cos_light, alpha(surface))
+    };
+    Some(Lobe {
+        towards: above(towards, -surface.geometric_normal),
+        weight: surface.base_color * passed * (through * shadowed),
+        density: f32::INFINITY,
+    })
+}
+
+/// Where a diffused ray goes on; `None` for surfaces that diffuse nothing.
+pub fn diffused(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
+    let radius = random[0].sqrt();
+    let (sin, cos) = (random[1] * TAU).sin_cos();
+    let height = (1.0 - random[0]).max(0.0).sqrt();
+    let (tangent, bitangent) = surface.normal.any_orthonormal_pair();
+    let towards = (tangent * (radius * cos) + bitangent * (radius * sin) + surface.normal * height)
+        .normalize_or(surface.normal);
+    if surface.geometric_normal.dot(towards) <= 0.0 || height <= 0.0 {
+        return None;
+    }
+    let weight = super::brdf::diffuse(surface, towards) * std::f32::consts::PI;
+    (weight != Vec3::ZERO).then(|| Lobe {
+        towards,
+        weight,
+        density: diffusion_density(surface, towards),
+    })
+}
+
+/// Density with which [`diffused`] draws a direction.
+pub fn diffusion_density(surface: &Surface, towards: Vec3) -> f32 {
+    surface.normal.dot(towards).max(0.0) * FRAC_1_PI
+}
+
+/// Whether reflection and transmission have one direction.
+pub fn is_smooth(surface: &Surface) -> bool {
+    surface.roughness < SMOOTH
+}
+
+/// The direction behind a facet by Snell's law; `ratio` is the index of refraction on the viewer's side over that
+/// behind. `None` at total reflection.
+fn refracted(view: Vec3, half: Vec3, ratio: f32) -> Option<Vec3> {
+    let cos = view.dot(half);
+    let below = 1.0 - ratio * ratio * (1.0 - cos * cos).max(0.0);
+    (below > 0.0).then(|| (half * (ratio * cos - below.sqrt()) - view * ratio).normalize_or(-view))
+}
+
+/// The shading normal, bent towards the viewer where interpolation or a normal map has turned it away.
+fn seen_normal(surface: &Surface) -> Vec3 {
+    const LEAST: f32 = 0.01;
+    let cos = surface.normal.dot(surface.view);
+    if cos >= LEAST {
+        surface.normal
+    } else {
+        (surface.normal + surface.view * (LEAST - cos)).normalize_or(surface.geometric_normal)
+    }
+}
+
+/// The direction itself, or mirrored to the side of a plane on which it belongs: interpolated normals can send a
+/// ray to the wrong side of its triangle.
+fn above(towards: Vec3, plane: Vec3) -> Vec3 {
+    let cos = towards.dot(plane);
+    if cos > 0.0 {
+        towards
+    } else {
+        (towards + plane * (1e-3 - 2.0 * cos)).normalize_or(plane)
+    }
+}
+
+fn alpha(surface: &Surface) -> f32 {
+    (surface.roughness * surface.roughness).max(MIN_ALPHA)
+}
+
+/// Smith's share of facets that are seen from a direction.
+fn seen_share(cos: f32, alpha: f32) -> f32 {
+    let a2 = alpha * alpha;
+    2.0 * cos / (cos + (a2 + (1.0 - a2) * cos * cos).sqrt())
+}
+
+/// Of the facets that the viewer sees, the share that the light sees too, heights correlated.
+fn lit_share(cos_view: f32, cos_light: f32, alpha: f32) -> f32 {
+    let a2 = alpha * alpha;
+    let slope = |cos: f32| (a2 + (1.0 - a2) * cos * cos).sqrt();
+    let (view, light) = (cos_light * slope(cos_view), cos_view * slope(cos_light));
+    let both = 2.0 * cos_view * cos_light / (view + light);
+    (both / seen_share(cos_view, alpha)).min(1.0)
+}
+
+/// A facet's normal, drawn among those that the viewer sees.
+fn visible_facet(normal: Vec3, view: Vec3, alpha: f32, random: [f32; 2]) -> Vec3 {
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    let local = Vec3::new(view.dot(tangent), view.dot(bitangent), view.dot(normal));
+    let stretched = Vec3::new(local.x * alpha, local.y * alpha, local.z).normalize_or(Vec3::Z);
+    // A disk seen from the stretched view, the half of it that lies behind squeezed.
+    let first = Vec2::new(-stretched.y, stretched.x)
+        .normalize_or(Vec2::X)
+        .extend(0.0);
+    let second = stretched.cross(first);
+    let (sin, cos) = (random[1] * TAU).sin_cos();
+    let (x, mut y) = (random[0].sqrt() * cos, random[0].sqrt() * sin);
+    let squeeze = 0.5 * (1.0 + stretched.z);
+    y = (1.0 - squeeze) * (1.0 - x * x).max(0.0).sqrt() + squeeze * y;
+    let z = (1.0 - x * x - y * y).max(0.0).sqrt();
+    let facet = first * x + second * y + stretched * z;
+    let facet = Vec3::new(facet.x * alpha, facet.y * alpha, facet.z.max(1e-6)).normalize_or(Vec3::Z);
+    (tangent * facet.x + bitangent * facet.y + normal * facet.z).normalize_or(normal)
+}
