@@ -19,7 +19,7 @@ use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
 use crate::progress::Bar;
-use crate::render::{check_memory, options};
+use crate::render::{check_memory, environment, options};
 use crate::report::{self, count, duration, milliseconds};
 use crate::values::{Shard, Span};
 use crate::view::View;
@@ -70,12 +70,14 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
     let options = RenderOptions {
         layers: first.layers,
         level,
+        environment_samples: args.view.environment_samples,
         ..options(&args.picture)
     };
     check_memory(&options, first.bytes_a_pixel())?;
     machine::start_threads(args.run.threads)?;
     let bar = Bar::of_frames(!args.run.quiet);
     bar.phase("reading");
+    let environment = environment(&args.view)?;
     let input = Input::read(&args.source)?;
     input.check_size()?;
     let animation = input.animation(args.animation.as_deref())?;
@@ -87,13 +89,15 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
 
     bar.phase("rendering");
     bar.frames(wanted.len() as u64);
+    let mut renderer = Renderer::new(&input.scene);
+    renderer.set_environment(environment);
     let mut job = Job {
         args,
         input: &input,
         animation,
         frames,
         options,
-        renderer: Renderer::new(&input.scene),
+        renderer,
         geometry: FrameGeometry::default(),
     };
     if movie {

@@ -9,7 +9,9 @@ use glam::{DVec3, Vec3};
 use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
-use crate::values::{self, Casters, LayerName, LightValue, Operator, Shard, Size, Span, Up};
+use crate::values::{
+    self, Casters, Exposure, Filter, LayerName, LightValue, Operator, Shard, Size, Span, Up,
+};
 
 const HELP: &str = "\
 Examples:
@@ -37,6 +39,7 @@ Examples:
   rayward render city.glb --camera-position 40,30,60 --light sun:1,2,1 -o city.png
   rayward render --builtin walker --time 0.4 --shutter 0.04 --pixel-samples 32 -o walk.png
   rayward render --aperture 0.2 --focus 8 -o blurred.png
+  rayward render model.glb --environment sky.hdr --exposure auto -o model.png
   rayward render model.glb --light square:0,3,1:0.5 --samples 64 -o soft.png
   rayward render model.glb --layers depth,normal -o model.exr
   rayward render model.glb --npy layers --json > summary.json
@@ -168,6 +171,22 @@ pub(crate) struct ViewArgs {
     /// intensity, a white matt surface in the middle of the scene shows radiance 1
     #[arg(long = "light", value_name = "LIGHT", value_parser = values::light)]
     pub(crate) lights: Vec<LightValue>,
+    /// Image of the light from all directions, .hdr or .exr, equirectangular with +Z in the middle: lights the
+    /// scene, and is seen behind it and in mirrors. No light is made up then
+    #[arg(long, value_name = "FILE")]
+    pub(crate) environment: Option<PathBuf>,
+    /// Turn of the environment around +Y in degrees, counter-clockwise as seen from above
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = values::single,
+        allow_hyphen_values = true, requires = "environment")]
+    pub(crate) environment_rotation: f32,
+    /// Factor on the environment's radiance
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = values::factor,
+        requires = "environment")]
+    pub(crate) environment_intensity: f32,
+    /// Directions of the environment that each surface seen asks about
+    #[arg(long, value_name = "NUMBER", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=4096),
+        requires = "environment")]
+    pub(crate) environment_samples: u32,
 }
 
 /// `rayward render`
@@ -277,7 +296,7 @@ pub(crate) struct PictureArgs {
     /// Lights cast no shadows
     #[arg(long)]
     pub(crate) no_shadows: bool,
-    /// Samples of a light with a size, for each surface that a pixel sees
+    /// Samples of a light with a size, and of a glossy reflection, for each surface that a pixel sees
     #[arg(long, value_name = "NUMBER", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=256))]
     pub(crate) samples: u32,
     /// Chooses the samples: the same number gives the same picture
@@ -292,32 +311,45 @@ pub(crate) struct PictureArgs {
     /// From linear colour to what is displayed, for PNG; `none`, or `exposure` where --exposure is given
     #[arg(long, value_name = "OPERATOR")]
     pub(crate) tone_map: Option<Operator>,
-    /// Photographic stops, for the tone maps exposure and aces
-    #[arg(long, value_name = "STOPS", value_parser = values::single, allow_hyphen_values = true)]
-    pub(crate) exposure: Option<f32>,
-    /// Linear colour where nothing is seen, r,g,b
+    /// Photographic stops, for the tone maps exposure and aces; auto makes the picture's middle a mid grey
+    #[arg(long, value_name = "STOPS|auto", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub(crate) exposure: Option<Exposure>,
+    /// Linear colour where nothing is seen, r,g,b, also before an environment
     #[arg(long, value_name = "COLOR", value_parser = values::color)]
     pub(crate) background: Option<Vec3>,
     /// Linear colour of the light from all around, r,g,b
-    #[arg(long, value_name = "COLOR", value_parser = values::color)]
+    #[arg(long, value_name = "COLOR", value_parser = values::color, conflicts_with = "environment")]
     pub(crate) ambient: Option<Vec3>,
-    /// Eye rays a pixel, whose mean it is; 1, or 16 with a lens or a shutter
+    /// Longest chain of reflections and refractions; 0 traces none
+    #[arg(long, value_name = "NUMBER", default_value_t = 8, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) bounces: u32,
+    /// How many of these may be diffuse, for light from other surfaces; needs many samples
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) diffuse_bounces: u32,
+    /// Eye rays a pixel, whose mean it is, against jagged edges and noise; 1, or 16 with a lens or a shutter
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) pixel_samples: Option<u32>,
+    /// How a pixel weighs its samples, without a lens or a shutter
+    #[arg(long, value_name = "FILTER", default_value = "blackman-harris")]
+    pub(crate) pixel_filter: Filter,
     /// Diameter of the camera's lens: what is not in the plane of focus is blurred. A lens of 50 mm at f/2 has 0.025
-    #[arg(long, value_name = "METRES", value_parser = values::positive)]
+    #[arg(long, value_name = "METRES", value_parser = values::positive, conflicts_with = "environment")]
     pub(crate) aperture: Option<f64>,
     /// Distance of the plane of focus along the view; to the middle of the scene unless given
     #[arg(long, value_name = "METRES", value_parser = values::positive, requires = "aperture")]
     pub(crate) focus: Option<f64>,
     /// How long the shutter is open from the moment of --time on, in which things move on straight lines; lights
     /// stand still
-    #[arg(long, value_name = "SECONDS", value_parser = values::positive)]
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive, conflicts_with = "environment")]
     pub(crate) shutter: Option<f64>,
     /// The literal parameters of Hunt and Mark 2008: 100x100 tiles, 200x200 light grids, binning by bounding
     /// rectangle, back faces alone as casters, soft shadows as the share of a light that is seen
     #[arg(long)]
     pub(crate) paper: bool,
+    /// Test every triangle for every ray, in f64, to check the structures: the same picture, bit for bit. Small
+    /// pictures only
+    #[arg(long, conflicts_with_all = ["paper", "aperture", "shutter"])]
+    pub(crate) reference: bool,
 }
 
 /// Where the picture goes.

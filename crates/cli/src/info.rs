@@ -12,7 +12,6 @@ use crate::args::InfoArgs;
 use crate::failure::Failure;
 use crate::input::{self, Input};
 use crate::report::{self, clean, count, thousands};
-use crate::summary::not_shaded;
 
 /// The findings; its fields are those of the JSON object. Lengths are metres, angles degrees.
 #[derive(Serialize)]
@@ -149,12 +148,7 @@ impl Info {
                 max: (frame.origin + max.as_dvec3()).to_array(),
             }),
             components: Components::of(frame),
-            notices: scene
-                .notices
-                .iter()
-                .map(ToString::to_string)
-                .chain(not_shaded(scene))
-                .collect(),
+            notices: scene.notices.iter().map(ToString::to_string).collect(),
         }
     }
 

@@ -4,12 +4,13 @@ use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 
 use rayward::image_io::{encode_png, write_exr, write_npy, write_png};
+use rayward::tonemap::automatic_exposure;
 use rayward::{Error, Film, IntensityRange, LayerKind, Layers, ToneMap, ToneMapper};
 
 use crate::args::{PictureArgs, TargetArgs};
 use crate::failure::{Code, Failure};
 use crate::report;
-use crate::values::{self, Operator};
+use crate::values::{self, Exposure, Operator};
 
 /// File written without any wish.
 const DEFAULT: &str = "rayward.png";
@@ -29,6 +30,8 @@ pub(crate) struct Targets {
     /// Folder for arrays.
     arrays: Option<PathBuf>,
     tone_map: ToneMap,
+    /// Whether the picture decides on the exposure.
+    automatic: bool,
     /// Layers that have to be rendered besides the colour.
     pub(crate) layers: Layers,
 }
@@ -68,6 +71,7 @@ impl Targets {
             picture: written,
             arrays: target.npy.clone(),
             tone_map: tone_map(picture)?,
+            automatic: picture.exposure == Some(Exposure::Auto),
             layers: if layered {
                 values::layers(&target.layers)
             } else {
@@ -126,7 +130,12 @@ impl Targets {
 
     /// Three sRGB bytes a pixel.
     pub(crate) fn encode(&self, film: &Film) -> Vec<u8> {
-        let mut mapper = ToneMapper::new(self.tone_map);
+        let operator = if self.automatic {
+            self.tone_map.exposed(automatic_exposure(&film.color))
+        } else {
+            self.tone_map
+        };
+        let mut mapper = ToneMapper::new(operator);
         if self.tone_map == ToneMap::PreviousFrame {
             mapper.end_frame(IntensityRange::of(&film.color));
         }
@@ -167,7 +176,10 @@ fn check_folder(path: &Path) -> Result<(), Failure> {
 }
 
 fn tone_map(args: &PictureArgs) -> Result<ToneMap, Failure> {
-    let stops = args.exposure.unwrap_or(0.0);
+    let stops = match args.exposure {
+        Some(Exposure::Stops(stops)) => stops,
+        Some(Exposure::Auto) | None => 0.0,
+    };
     let operator = args.tone_map.unwrap_or(match args.exposure {
         Some(_) => Operator::Exposure,
         None => Operator::None,

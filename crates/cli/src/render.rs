@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use rayward::scene::{FrameGeometry, PosedCamera};
-use rayward::{Lens, Progress, RenderOptions, RenderedFrame, Renderer, Shutter};
+use rayward::{Environment, Lens, Progress, RenderOptions, RenderedFrame, Renderer, Shutter};
 
-use crate::args::{PictureArgs, RenderArgs};
+use crate::args::{PictureArgs, RenderArgs, ViewArgs};
 use crate::failure::{Code, Failure};
 use crate::input::{self, Input};
 use crate::machine;
@@ -25,6 +25,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let options = RenderOptions {
         layers: targets.layers,
         level,
+        environment_samples: args.view.environment_samples,
         ..options(&args.picture)
     };
 
@@ -32,6 +33,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 
     let bar = Bar::new(!args.run.quiet);
     bar.phase("reading");
+    let environment = environment(&args.view)?;
     let input = Input::read(&args.source)?;
     bar.phase("posing");
     let pose_start = Instant::now();
@@ -53,6 +55,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     bar.phase("preparing");
     let prepare_start = Instant::now();
     let mut renderer = Renderer::new(&input.scene);
+    renderer.set_environment(environment);
     let prepare = prepare_start.elapsed();
     bar.phase("rendering");
     let show = |progress| bar.show(progress);
@@ -121,7 +124,9 @@ fn picture(
 /// `pixel` is what it takes in bytes, film and writing together.
 pub(crate) fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Failure> {
     let (width, height) = (options.width, options.height);
-    let bytes = u128::from(width) * u128::from(height) * u128::from(pixel);
+    // Colour and alpha once more, to sum them up.
+    let mean = if options.pixel_samples > 1 { 16 } else { 0 };
+    let bytes = u128::from(width) * u128::from(height) * u128::from(pixel + mean);
     match machine::available_memory() {
         Some(memory) if bytes > u128::from(memory) => Err(Failure::new(
             Code::Limit,
@@ -131,6 +136,18 @@ pub(crate) fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Fa
         )),
         _ => Ok(()),
     }
+}
+
+/// The environment asked for, turned and scaled.
+pub(crate) fn environment(args: &ViewArgs) -> Result<Option<Environment>, Failure> {
+    let Some(file) = &args.environment else {
+        return Ok(None);
+    };
+    let read = Environment::read(file)?;
+    Ok(Some(
+        read.turned(args.environment_rotation.to_radians())
+            .scaled(args.environment_intensity),
+    ))
 }
 
 /// The lens asked for, focused on the middle of the scene if on nothing else.
@@ -157,8 +174,13 @@ pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
         tinted_shadows: args.tinted_shadows,
         ambient: args.ambient.unwrap_or(defaults.ambient),
         background: args.background.unwrap_or(defaults.background),
+        show_environment: args.background.is_none(),
+        bounces: args.bounces,
+        diffuse_bounces: args.diffuse_bounces.min(args.bounces),
+        pixel_filter: args.pixel_filter.into(),
         pixel_samples: args.pixel_samples.unwrap_or(if spread { 16 } else { 1 }),
         paper: args.paper,
+        reference: args.reference,
         ..defaults
     }
 }

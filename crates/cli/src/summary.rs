@@ -41,9 +41,10 @@ pub(crate) struct Summary {
     structures: Vec<Structure>,
     eye_rays: u64,
     shadow_rays: u64,
+    secondary_rays: u64,
     exact_pixels: u64,
     lit_by_cell: u64,
-    /// Eye and shadow rays over the time of builds and tiles, shading included.
+    /// All rays over the time of builds and tiles, shading included.
     mray_per_s: f64,
     load_ms: f64,
     pose_ms: f64,
@@ -79,9 +80,11 @@ impl Summary {
         files: Vec<PathBuf>,
     ) -> Self {
         let seconds = (stats.build + stats.trace).as_secs_f64();
-        let rays = (stats.eye_rays + stats.shadow_rays) as f64;
+        let rays = (stats.eye_rays + stats.shadow_rays + stats.secondary_rays) as f64;
         let mut notices: Vec<_> = input.scene.notices.iter().map(ToString::to_string).collect();
-        notices.extend(not_shaded(&input.scene));
+        if options.bounces == 0 {
+            notices.extend(not_shaded(&input.scene));
+        }
         if moment.time != 0.0 && input.scene.animations.is_empty() {
             notices.push("--time: the scene has no animation".into());
         }
@@ -101,6 +104,7 @@ impl Summary {
             structures: stats.structures.iter().map(Structure::from).collect(),
             eye_rays: stats.eye_rays,
             shadow_rays: stats.shadow_rays,
+            secondary_rays: stats.secondary_rays,
             exact_pixels: stats.exact_pixels,
             lit_by_cell: stats.lit_by_cell,
             mray_per_s: rays / seconds.max(1e-9) / 1e6,
@@ -154,6 +158,7 @@ impl Summary {
             self.camera_origin.words()
         )?;
         let lights = match self.lights.as_slice() {
+            [] => "none ".into(),
             [one] => quoted(one, self.lights_origin),
             more => format!("{} ", more.len()),
         };
@@ -169,9 +174,10 @@ impl Summary {
         }
         writeln!(
             out,
-            "rays        {} eye, {} shadow: {:.1} Mray/s with builds and shading",
+            "rays        {} eye, {} shadow, {} secondary: {:.1} Mray/s with builds and shading",
             thousands(self.eye_rays),
             thousands(self.shadow_rays),
+            thousands(self.secondary_rays),
             self.mray_per_s
         )?;
         writeln!(
@@ -225,8 +231,8 @@ impl From<&rayward::StructureStats> for Structure {
     }
 }
 
-/// What materials ask for that is not rendered, each said once.
-pub(crate) fn not_shaded(scene: &Scene) -> Vec<String> {
+/// What materials ask for that is not rendered without reflections and refractions, each said once.
+fn not_shaded(scene: &Scene) -> Vec<String> {
     let count = |asks: fn(&Material) -> bool| scene.materials.iter().filter(|m| asks(m)).count();
     let transmitting = count(|m| m.transmission > 0.0);
     let mirrors =
@@ -234,12 +240,12 @@ pub(crate) fn not_shaded(scene: &Scene) -> Vec<String> {
     let mut notices = Vec::new();
     if transmitting > 0 {
         notices.push(format!(
-            "{transmitting} materials transmit light: they are shown opaque"
+            "--bounces 0: {transmitting} materials that transmit light are shown opaque"
         ));
     }
     if mirrors > 0 {
         notices.push(format!(
-            "{mirrors} materials are mirrors: reflections are not traced"
+            "--bounces 0: {mirrors} materials that are mirrors reflect no surfaces"
         ));
     }
     notices

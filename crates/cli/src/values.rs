@@ -1,7 +1,7 @@
 //! Values of the command line: parsed, checked, and nothing else.
 
 use glam::{DVec3, Vec3};
-use rayward::{CasterPolicy, LayerKind, Layers, scene};
+use rayward::{CasterPolicy, LayerKind, Layers, PixelFilter, scene};
 
 /// What a parser returns.
 type Parsed<T> = Result<T, String>;
@@ -64,6 +64,33 @@ pub(crate) fn single(text: &str) -> Parsed<f32> {
         value if value.is_finite() => Ok(value),
         _ => Err("it is too large for single precision".into()),
     }
+}
+
+/// A factor in single precision, above 0.
+pub(crate) fn factor(text: &str) -> Parsed<f32> {
+    match single(text)? {
+        value if value > 0.0 => Ok(value),
+        _ => Err("it has to be above 0".into()),
+    }
+}
+
+/// An exposure, in stops or found from the picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Exposure {
+    /// Photographic stops.
+    Stops(f32),
+    /// The one that makes the picture's log average a mid grey.
+    Auto,
+}
+
+/// An exposure, see [`Exposure`].
+pub(crate) fn exposure(text: &str) -> Parsed<Exposure> {
+    if text == "auto" {
+        return Ok(Exposure::Auto);
+    }
+    single(text)
+        .map(Exposure::Stops)
+        .map_err(|problem| format!("{problem}, nor auto"))
 }
 
 /// A full vertical field of view in degrees.
@@ -262,6 +289,24 @@ impl From<Casters> for CasterPolicy {
     }
 }
 
+/// How a pixel weighs its samples.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(crate) enum Filter {
+    /// The pixel's square, evenly
+    Box,
+    /// A smooth window over three pixels
+    BlackmanHarris,
+}
+
+impl From<Filter> for PixelFilter {
+    fn from(filter: Filter) -> Self {
+        match filter {
+            Filter::Box => Self::Box,
+            Filter::BlackmanHarris => Self::BlackmanHarris,
+        }
+    }
+}
+
 /// The tone map by name; its exposure is an option of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Operator {
@@ -370,6 +415,13 @@ mod tests {
         ] {
             assert!(light(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn exposures_are_stops_or_automatic() {
+        assert_eq!(exposure("-1.5"), Ok(Exposure::Stops(-1.5)));
+        assert_eq!(exposure("auto"), Ok(Exposure::Auto));
+        assert!(exposure("bright").is_err() && factor("0").is_err());
     }
 
     #[test]

@@ -24,6 +24,7 @@ pub(crate) enum Origin {
     CommandLine,
     CameraFile,
     Scene,
+    Environment,
     MadeUp,
 }
 
@@ -34,6 +35,7 @@ impl Origin {
             Self::CommandLine => "from the command line",
             Self::CameraFile => "from the camera file",
             Self::Scene => "of the scene",
+            Self::Environment => "but the environment",
             Self::MadeUp => "made up",
         }
     }
@@ -88,6 +90,8 @@ impl View {
             (of_file, Origin::CameraFile)
         } else if !frame.lights.is_empty() {
             (frame.lights.clone(), Origin::Scene)
+        } else if args.environment.is_some() {
+            (Vec::new(), Origin::Environment)
         } else {
             (scene::default_lights(&camera), Origin::MadeUp)
         };

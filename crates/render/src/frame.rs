@@ -10,16 +10,20 @@ use rayward_trace::{Clusters, Topology};
 use crate::casters::{CasterRules, transparent_triangles};
 use crate::distributed::{self, Shutter};
 use crate::geometry::triangles;
+use crate::mean::Mean;
 use crate::plan::FramePlan;
+use crate::reference::EveryTriangle;
+use crate::secondary::SecondaryTracer;
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
-use crate::{CameraFrame, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
+use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
 
 /// Renders frames of one scene. Keeps what outlives a frame: materials, textures, the topology and clusters.
 #[derive(Debug)]
 pub struct Renderer<'s> {
     scene: &'s Scene,
     shader: Shader<'s>,
+    environment: Option<Environment>,
     topology: Option<(Vec<[u32; 3]>, Topology, Clusters)>,
 }
 
@@ -47,8 +51,14 @@ impl<'s> Renderer<'s> {
         Self {
             scene,
             shader: Shader::new(scene),
+            environment: None,
             topology: None,
         }
+    }
+
+    /// Lights the scene with an environment, or with the ambient light of the options again.
+    pub fn set_environment(&mut self, environment: Option<Environment>) {
+        self.environment = environment;
     }
 
     /// Renders one frame on the threads of the current rayon pool. The picture is the same for any number of
@@ -67,7 +77,7 @@ impl<'s> Renderer<'s> {
         options: &RenderOptions,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<RenderedFrame> {
-        if options.pixel_samples > 1 || options.lens.is_some() {
+        if options.lens.is_some() {
             let still = Shutter { geometry, camera };
             return self.render_shutter(geometry, camera, still, lights, options, progress);
         }
@@ -80,9 +90,18 @@ impl<'s> Renderer<'s> {
         let eye = (!camera.orthographic).then(|| camera.eye.as_dvec3());
         let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
 
-        let plan = FramePlan::new(geometry, lights, options);
+        let environment = self.environment.as_ref();
+        let plan = FramePlan::new(geometry, lights, options).with_secondary(
+            self.scene,
+            geometry,
+            environment.is_some(),
+            options,
+        );
         let eye = camera.vantage();
-        let structures = FrameStructures::build(&plan, view, geometry, clusters, &rules, eye, options);
+        let samples = options.pixel_samples.max(1);
+        let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));
+        let first = shifted(samples - 1);
+        let mut structures = FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options);
         let build = start.elapsed();
 
         let start = Instant::now();
@@ -90,46 +109,48 @@ impl<'s> Renderer<'s> {
             .iter()
             .map(|l| ShadingLight::new(l, geometry.origin))
             .collect();
-        let shader = TileShader {
-            shader: &self.shader,
-            geometry,
-            camera: &camera,
-            lights: &shading_lights,
-            ends: &plan.lights,
-            structures: &structures,
-            eye: camera.vantage(),
-            options,
+        let total = u64::from(structures.eye.tile_count()) * u64::from(samples);
+        let done = AtomicU64::new(0);
+        let told = || {
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            progress(Progress { done, total });
         };
-        let side = structures.eye.tile_side();
-        let mut tiles = film.tiles_mut(side, side);
-        let (done, total) = (AtomicU64::new(0), tiles.len() as u64);
-        let counts = tiles
-            .par_iter_mut()
-            .enumerate()
-            .map_init(TileWork::default, |work, (index, out)| {
-                let counts = shader.render(index as u32, work, out);
-                progress(Progress {
-                    done: done.fetch_add(1, Ordering::Relaxed) + 1,
-                    total,
-                });
-                counts
-            })
-            .reduce(TileCounts::default, TileCounts::sum);
-        drop(tiles);
-        let counts = structures.counts().sum(counts);
-
-        let stats = FrameStats {
-            triangles: geometry.triangle_count(),
-            dropped_non_finite: geometry.dropped_non_finite,
-            dropped_degenerate: geometry.dropped_degenerate,
-            structures: structures.stats,
-            eye_rays: u64::from(options.width) * u64::from(options.height),
-            shadow_rays: counts.shadow_rays,
-            exact_pixels: counts.exact_pixels,
-            lit_by_cell: counts.lit_by_cell,
-            build,
-            trace: start.elapsed(),
-        };
+        let mut mean = (samples > 1).then(|| Mean::new(&film));
+        let mut counts = TileCounts::default();
+        // The centres come last and leave what the film's other layers hold.
+        for sample in (0..samples).rev() {
+            if sample + 1 < samples {
+                structures.look(shifted(sample), &plan, geometry, clusters, &rules, eye, options);
+            }
+            let shader = TileShader {
+                shader: &self.shader,
+                geometry,
+                camera: &camera,
+                lights: &shading_lights,
+                ends: &plan.lights,
+                structures: &structures,
+                eye,
+                environment,
+                secondary: structures
+                    .secondary
+                    .as_deref()
+                    .map(|all| all as &dyn SecondaryTracer),
+                reference: options.reference.then(|| EveryTriangle(triangles(geometry))),
+                sample,
+                options,
+            };
+            counts = counts.sum(render_tiles(&shader, &mut film, &told));
+            counts = counts.sum(structures.counts());
+            if let Some(mean) = &mut mean {
+                mean.add(&film);
+            }
+        }
+        if let Some(mean) = mean {
+            mean.finish(&mut film);
+        }
+        let mut stats = stats(geometry, options, counts);
+        stats.structures = structures.stats;
+        (stats.build, stats.trace) = (build, start.elapsed());
         Ok(RenderedFrame { film, stats })
     }
 
@@ -178,4 +199,34 @@ impl<'s> Renderer<'s> {
             }
         }
     }
+}
+
+/// What was counted.
+fn stats(geometry: &FrameGeometry, options: &RenderOptions, counts: TileCounts) -> FrameStats {
+    let pixels = u64::from(options.width) * u64::from(options.height);
+    FrameStats {
+        triangles: geometry.triangle_count(),
+        dropped_non_finite: geometry.dropped_non_finite,
+        dropped_degenerate: geometry.dropped_degenerate,
+        eye_rays: pixels * u64::from(options.pixel_samples.max(1)),
+        shadow_rays: counts.shadow_rays,
+        secondary_rays: counts.secondary_rays,
+        exact_pixels: counts.exact_pixels,
+        lit_by_cell: counts.lit_by_cell,
+        ..FrameStats::default()
+    }
+}
+
+/// Renders all tiles of one sample of the pixels.
+fn render_tiles(shader: &TileShader, film: &mut Film, told: &(impl Fn() + Sync)) -> TileCounts {
+    let side = shader.structures.eye.tile_side();
+    film.tiles_mut(side, side)
+        .par_iter_mut()
+        .enumerate()
+        .map_init(TileWork::default, |work, (index, out)| {
+            let counts = shader.render(index as u32, work, out);
+            told();
+            counts
+        })
+        .reduce(TileCounts::default, TileCounts::sum)
 }

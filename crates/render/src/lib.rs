@@ -23,19 +23,25 @@
 //! }
 //! ```
 
+mod bounce;
 mod camera;
 mod casters;
 pub mod compare;
 mod distributed;
+pub mod environment;
 mod error;
 mod film;
 mod frame;
 mod geometry;
 pub mod image_io;
 mod lens;
+mod mean;
 mod options;
+mod pixel_filter;
 mod pixel_samples;
 mod plan;
+mod reference;
+mod secondary;
 pub mod shade;
 mod stats;
 mod structures;
@@ -47,6 +53,7 @@ pub use camera::CameraFrame;
 pub use casters::CasterRules;
 pub use compare::{CompareOptions, Comparison, compare};
 pub use distributed::Shutter;
+pub use environment::Environment;
 pub use error::{Error, Result};
 pub use film::{Film, LayerKind, Layers, NO_ID, Sample, TileMut};
 pub use frame::{Progress, RenderedFrame, Renderer};
@@ -54,7 +61,9 @@ pub use geometry::{shadow_end, triangles};
 pub use image_io::{Picture, read_picture};
 pub use lens::Lens;
 pub use options::{CasterPolicy, RenderOptions};
+pub use pixel_filter::PixelFilter;
 pub use plan::{FramePlan, LightPlan};
+pub use secondary::{SecondaryTracer, SurfaceHit};
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use stats::{FrameStats, StructureStats};
 pub use structures::{FrameStructures, LightShadows};

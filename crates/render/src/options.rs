@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayward_trace::SimdLevel;
 
-use crate::{Layers, Lens};
+use crate::{Layers, Lens, PixelFilter};
 
 /// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with shadows.
 #[derive(Clone, Copy, Debug)]
@@ -18,16 +18,26 @@ pub struct RenderOptions {
     pub casters: CasterPolicy,
     /// Whether blended surfaces colour the light they let through; they dim it otherwise.
     pub tinted_shadows: bool,
-    /// Radiance that surrounds the scene, for surfaces that no light reaches.
+    /// Radiance that surrounds the scene, for surfaces that no light reaches. An environment takes its place.
     pub ambient: Vec3,
     /// Radiance where no surface is seen.
     pub background: Vec3,
-    /// Eye rays a pixel. More than one, a lens or a shutter make a frame of distributed rays, see
-    /// [`crate::Renderer::render_shutter`]; their mean is the pixel.
+    /// Whether an environment is seen behind everything; the background is if not. Reflections see it either way.
+    pub show_environment: bool,
+    /// Directions to the environment drawn for each surface that a pixel sees.
+    pub environment_samples: u32,
+    /// Longest chain of reflections and refractions; 0 traces none.
+    pub bounces: u32,
+    /// How many of these may be diffuse, for light from other surfaces.
+    pub diffuse_bounces: u32,
+    /// Eye rays a pixel, whose mean it is: as many frames, or with a lens or a shutter distributed rays, see
+    /// [`crate::Renderer::render_shutter`].
     pub pixel_samples: u32,
+    /// How they lie about the pixel, but for distributed rays.
+    pub pixel_filter: PixelFilter,
     /// The lens of the camera; `None` is a pinhole, before which all is sharp.
     pub lens: Option<Lens>,
-    /// Samples of a light with a size, for each surface a pixel sees: from 1 to [`rayward_trace::MAX_SAMPLES`].
+    /// Samples of a light with a size, and of a glossy reflection, for each surface a pixel sees: from 1 to [`rayward_trace::MAX_SAMPLES`].
     pub samples: u32,
     /// Chooses the samples. The same seed gives the same picture.
     pub seed: u32,
@@ -36,6 +46,9 @@ pub struct RenderOptions {
     /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
     /// back faces alone as casters, lights with a size shaded from their middle times the share of samples seen.
     pub paper: bool,
+    /// Every ray answered by testing every triangle in f64: the same picture, slowly, to check structures against.
+    /// Frames with a lens or a shutter do not know it.
+    pub reference: bool,
     /// Instruction set of the kernels; the picture does not depend on it.
     pub level: SimdLevel,
 }
@@ -50,12 +63,18 @@ impl Default for RenderOptions {
             tinted_shadows: false,
             ambient: Vec3::splat(0.1),
             background: Vec3::new(0.44, 0.54, 0.68),
+            show_environment: true,
+            environment_samples: 16,
+            bounces: 8,
+            diffuse_bounces: 0,
             pixel_samples: 1,
+            pixel_filter: PixelFilter::default(),
             lens: None,
             samples: 8,
             seed: 0,
             layers: Layers::default(),
             paper: false,
+            reference: false,
             level: SimdLevel::detect(),
         }
     }

@@ -8,12 +8,14 @@
 //! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3) |
 //! | those of eye and lights through masked and blended surfaces | a grid of these alone for each, if there are any |
 //! | those of lights with a size through them | a hierarchy, if there are both |
+//! | rays that leave surfaces, and the shadow rays of what they meet | the same hierarchy |
 
 use glam::DVec3;
-use rayward_scene::{FrameGeometry, LightKind, PosedLight};
+use rayward_scene::{FrameGeometry, LightKind, Material, ObjectRange, PosedLight, Scene};
 use rayward_trace::{AreaLight, Cone, EyeGridOptions, Light, LightGridOptions};
 
 use crate::RenderOptions;
+use crate::bounce::GLOSSY;
 use crate::geometry::shadow_end;
 
 /// The structures of one frame.
@@ -23,6 +25,8 @@ pub struct FramePlan {
     pub eye: EyeGridOptions,
     /// One entry a light: how its shadows are found, or `None` if it casts none.
     pub lights: Vec<Option<LightPlan>>,
+    /// Whether surfaces send out rays of their own.
+    pub secondary: bool,
 }
 
 /// The grid of one light.
@@ -42,7 +46,7 @@ pub struct LightPlan {
 const WIDEST_CONE: f32 = 1.2;
 
 impl FramePlan {
-    /// The plan for these lights.
+    /// The plan for these lights, without rays that leave surfaces.
     pub fn new(geometry: &FrameGeometry, lights: &[PosedLight], options: &RenderOptions) -> Self {
         let eye = if options.paper {
             EyeGridOptions::paper()
@@ -73,8 +77,35 @@ impl FramePlan {
             .iter()
             .map(|light| options.shadows.then(|| plan(light)))
             .collect();
-        Self { eye, lights }
+        Self {
+            eye,
+            lights,
+            secondary: false,
+        }
     }
+
+    /// The same with rays that leave surfaces, where the materials seen or an environment ask for such.
+    pub fn with_secondary(
+        self,
+        scene: &Scene,
+        geometry: &FrameGeometry,
+        environment: bool,
+        options: &RenderOptions,
+    ) -> Self {
+        let shown = |object: &ObjectRange| sends_rays(&scene.materials[object.material as usize]);
+        let bounces =
+            options.bounces > 0 && (options.diffuse_bounces > 0 || geometry.objects.iter().any(shown));
+        Self {
+            secondary: environment || bounces,
+            ..self
+        }
+    }
+}
+
+/// Whether a material may reflect or transmit along rays.
+fn sends_rays(material: &Material) -> bool {
+    let may_be_glossy = material.roughness <= GLOSSY || material.metallic_roughness_texture.is_some();
+    !material.unlit && (may_be_glossy || material.transmission > 0.0)
 }
 
 /// A light's size in the local frame; `None` for a point and a single direction.

@@ -15,8 +15,10 @@ pub struct FrameStats {
     pub structures: Vec<StructureStats>,
     /// Eye rays traced: one a pixel, or as many as were asked for.
     pub eye_rays: u64,
-    /// Shadow rays asked for: one for each pixel and light whose surface faces the light.
+    /// Shadow rays asked for: one for each sample of a light that a surface faces, the environment's included.
     pub shadow_rays: u64,
+    /// Rays that surfaces sent to others: reflected, transmitted, diffused.
+    pub secondary_rays: u64,
     /// Pixels whose closest triangle was decided by exact arithmetic.
     pub exact_pixels: u64,
     /// Shadow rays answered by the nearest distance of their cell alone.

@@ -1,16 +1,19 @@
 //! Builds what the plan says, and times it.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
-    PointLightGrid, SimdLevel, Tile, View, Visibility,
+    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch, PointLightGrid,
+    SimdLevel, Tile, Triangles, View, Visibility,
 };
 
 use crate::casters::CasterRules;
 use crate::geometry::triangles;
 use crate::plan::{FramePlan, LightPlan};
+use crate::reference::EveryTriangle;
+use crate::secondary::SecondaryTracer;
 use crate::tile::TileCounts;
 use crate::{RenderOptions, StructureStats};
 
@@ -27,8 +30,12 @@ pub struct FrameStructures<'g> {
     pub veils: Option<EyeVeils<'g>>,
     /// One entry a light: its grid over masked and blended triangles, if there are any and it has one end.
     pub light_veils: Vec<Option<PointLightGrid<'g>>>,
-    /// A hierarchy of all triangles, for lights with a size where there are masked or blended ones.
-    pub layers: Option<Bvh<'g>>,
+    /// A structure of all triangles, for lights with a size where there are masked or blended ones.
+    pub layers: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// The same, for rays that leave surfaces; `None` if nothing sends any.
+    pub secondary: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// Whether any triangle is masked or blended.
+    pub transparent: bool,
     /// What each structure cost.
     pub stats: Vec<StructureStats>,
 }
@@ -44,6 +51,8 @@ pub enum LightShadows<'g> {
     Pixels(LitPixels),
     /// By samples of its area.
     Area(AreaLightTree<'g>),
+    /// By every triangle, for references.
+    Reference,
 }
 
 impl<'g> FrameStructures<'g> {
@@ -62,19 +71,14 @@ impl<'g> FrameStructures<'g> {
         let mut stats = Timed::default();
         let eye = stats.build(
             "eye grid",
-            || {
-                if plan.eye.hierarchy {
-                    return EyeGrid::build_clustered(view, triangles, clusters, plan.eye, options.level);
-                }
-                let opaque = |prim| !rules.is_transparent(prim);
-                EyeGrid::build_of(view, triangles, opaque, plan.eye, options.level)
-            },
+            || eye_grid(plan, view, geometry, clusters, rules, options.level),
             |eye| [eye.bytes(), eye.tile_count() as usize, eye.reference_count()],
         );
 
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
         let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(|p| p.area.is_none());
-        let at_once = plan.lights.iter().any(hard) && !rules.any_transparent() && !options.paper;
+        let slowly = rules.any_transparent() || options.paper || options.reference;
+        let at_once = plan.lights.iter().any(hard) && !slowly;
         let visibility = at_once.then(|| {
             let trace = || Visibility::trace(&eye, &|| ());
             stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
@@ -88,6 +92,11 @@ impl<'g> FrameStructures<'g> {
                 light_veils.push(None);
                 continue;
             };
+            if options.reference {
+                lights.push(LightShadows::Reference);
+                light_veils.push(None);
+                continue;
+            }
             let name = if plan.name.is_empty() {
                 i.to_string()
             } else {
@@ -114,7 +123,7 @@ impl<'g> FrameStructures<'g> {
             }));
         }
 
-        let veils = rules.any_transparent().then(|| {
+        let veils = (rules.any_transparent() && !options.reference).then(|| {
             let is_veil = |prim| rules.is_transparent(prim);
             stats.build(
                 "eye veils",
@@ -123,21 +132,47 @@ impl<'g> FrameStructures<'g> {
             )
         });
         let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
-        let layers = (soft && rules.any_transparent()).then(|| {
-            stats.build(
-                "hierarchy behind transparent surfaces",
-                || Bvh::build(triangles),
-                |bvh| [bvh.bytes(), 0, bvh.stats().triangles],
-            )
-        });
+        let through = (soft || options.reference) && rules.any_transparent();
+        let general = (through || plan.secondary).then(|| general(triangles, options, &mut stats));
         Self {
             eye,
             visibility,
             lights,
             veils,
             light_veils,
-            layers,
+            layers: general.clone().filter(|_| through),
+            transparent: rules.any_transparent(),
+            secondary: general.filter(|_| plan.secondary),
             stats: stats.0,
+        }
+    }
+
+    /// Looks again with another view of the same camera: all that depends on it is built anew, and not timed.
+    pub(crate) fn look(
+        &mut self,
+        view: View,
+        plan: &FramePlan,
+        geometry: &'g FrameGeometry,
+        clusters: &'g Clusters,
+        rules: &CasterRules,
+        eye_point: Light,
+        options: &RenderOptions,
+    ) {
+        let level = options.level;
+        self.eye = eye_grid(plan, view, geometry, clusters, rules, level);
+        if self.veils.is_some() {
+            let is_veil = |prim| rules.is_transparent(prim);
+            self.veils = Some(EyeVeils::build(view, triangles(geometry), is_veil, level));
+        }
+        if self.visibility.is_none() {
+            return;
+        }
+        self.visibility = Some(Visibility::trace(&self.eye, &|| ()));
+        for (plan, shadows) in plan.lights.iter().zip(&mut self.lights) {
+            if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
+                let seen = self.visibility.as_ref();
+                *shadows = shadows_of(plan, seen, geometry, rules, eye_point, level);
+            }
         }
     }
 
@@ -182,6 +217,39 @@ impl Timed {
         });
         built
     }
+}
+
+/// Builds the camera's grid over what is opaque.
+fn eye_grid<'g>(
+    plan: &FramePlan,
+    view: View,
+    geometry: &'g FrameGeometry,
+    clusters: &'g Clusters,
+    rules: &CasterRules,
+    level: SimdLevel,
+) -> EyeGrid<'g> {
+    let triangles = triangles(geometry);
+    if plan.eye.hierarchy {
+        return EyeGrid::build_clustered(view, triangles, clusters, plan.eye, level);
+    }
+    let opaque = |prim| !rules.is_transparent(prim);
+    EyeGrid::build_of(view, triangles, opaque, plan.eye, level)
+}
+
+/// Builds the structure for all other rays.
+fn general<'g>(
+    triangles: Triangles<'g>,
+    options: &RenderOptions,
+    stats: &mut Timed,
+) -> Arc<dyn SecondaryTracer + 'g> {
+    if options.reference {
+        return Arc::new(EveryTriangle(triangles));
+    }
+    Arc::new(stats.build(
+        "hierarchy for other rays",
+        || Bvh::build(triangles),
+        |bvh| [bvh.bytes(), 0, bvh.stats().triangles],
+    ))
 }
 
 /// The grid of a light over masked and blended triangles.
@@ -237,7 +305,7 @@ fn shadows_of<'g>(
 impl LightShadows<'_> {
     fn stats(&self, name: &str, start: Instant) -> StructureStats {
         let (what, bytes, cells, references) = match self {
-            Self::Nothing => ("no shadows", 0, 0, 0),
+            Self::Nothing | Self::Reference => ("no shadows", 0, 0, 0),
             Self::Grid(grid) => (
                 "light grid",
                 grid.bytes(),

@@ -1,7 +1,7 @@
 //! One tile: eye hits, surfaces, shadows light by light, colours (HM08 §3: eye rays drive everything, shadow
 //! rays are spawned for a tile of hits at a time).
 
-mod soft;
+pub(crate) mod soft;
 
 use std::ops::ControlFlow;
 
@@ -9,14 +9,17 @@ use glam::{Vec2, Vec3};
 use rayward_scene::FrameGeometry;
 use rayward_trace::exact::{self, ExactHit};
 use rayward_trace::{
-    AreaCounts, AreaScratch, Bvh, Light, Receiver, ShadowScratch, Tile, TileHits, TileVeils, ViewRay,
+    AreaCounts, AreaScratch, Light, Receiver, ShadowScratch, Tile, TileHits, TileVeils, ViewRay,
 };
 
+use crate::bounce::BounceWork;
 use crate::geometry::triangles;
 use crate::plan::LightPlan;
-use crate::shade::{ambient, direct, object_of};
+use crate::reference::EveryTriangle;
+use crate::secondary::SecondaryTracer;
+use crate::shade::{direct, object_of};
 use crate::structures::{FrameStructures, LightShadows};
-use crate::{CameraFrame, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
+use crate::{CameraFrame, Environment, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
 
 /// Everything a tile needs to know of its frame.
@@ -29,6 +32,13 @@ pub(crate) struct TileShader<'f> {
     pub(crate) structures: &'f FrameStructures<'f>,
     /// Where the eye rays come from.
     pub(crate) eye: Light,
+    pub(crate) environment: Option<&'f Environment>,
+    /// What answers the rays that surfaces send, if they send any.
+    pub(crate) secondary: Option<&'f dyn SecondaryTracer>,
+    /// What tests every triangle for every ray, if that is asked for.
+    pub(crate) reference: Option<EveryTriangle<'f>>,
+    /// Which sample of the pixels this is.
+    pub(crate) sample: u32,
     pub(crate) options: &'f RenderOptions,
 }
 
@@ -36,7 +46,8 @@ pub(crate) struct TileShader<'f> {
 #[derive(Default)]
 pub(crate) struct TileWork {
     hits: TileHits,
-    points: Vec<ShadedPoint>,
+    pub(crate) points: Vec<ShadedPoint>,
+    pub(crate) bounce: BounceWork,
     receivers: Vec<Receiver>,
     asked: Vec<(u32, Vec3)>,
     shadow: Vec<bool>,
@@ -48,6 +59,7 @@ pub(crate) struct TileWork {
     veil_scratch: ShadowScratch,
     passed: Vec<Vec3>,
     filters: Vec<u32>,
+    along: Vec<(f64, u32)>,
 }
 
 /// What has been seen of a pixel so far.
@@ -58,13 +70,13 @@ struct Seen {
 }
 
 /// A surface seen by a pixel, one of several behind each other if those before are transparent.
-struct ShadedPoint {
-    x: u32,
-    y: u32,
-    surface: Surface,
-    receiver: Receiver,
+pub(crate) struct ShadedPoint {
+    pub(crate) x: u32,
+    pub(crate) y: u32,
+    pub(crate) surface: Surface,
+    pub(crate) receiver: Receiver,
     /// Share of the pixel that shows it.
-    weight: f32,
+    pub(crate) weight: f32,
     color: Vec3,
 }
 
@@ -72,6 +84,7 @@ struct ShadedPoint {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct TileCounts {
     pub(crate) shadow_rays: u64,
+    pub(crate) secondary_rays: u64,
     pub(crate) exact_pixels: u64,
     pub(crate) lit_by_cell: u64,
 }
@@ -80,6 +93,7 @@ impl TileCounts {
     pub(crate) fn sum(self, other: Self) -> Self {
         Self {
             shadow_rays: self.shadow_rays + other.shadow_rays,
+            secondary_rays: self.secondary_rays + other.secondary_rays,
             exact_pixels: self.exact_pixels + other.exact_pixels,
             lit_by_cell: self.lit_by_cell + other.lit_by_cell,
         }
@@ -104,7 +118,8 @@ impl TileShader<'_> {
     /// Renders the tile of that index into its part of the film.
     pub(crate) fn render(&self, index: u32, work: &mut TileWork, out: &mut TileMut) -> TileCounts {
         let tile = self.structures.eye.tile(index);
-        let traced = self.structures.visibility.is_some();
+        // References trace pixel by pixel.
+        let traced = self.structures.visibility.is_some() || self.reference.is_some();
         if !traced {
             self.structures.eye.trace_tile(&tile, &mut work.hits);
         }
@@ -122,15 +137,20 @@ impl TileShader<'_> {
         }
         for light in 0..self.lights.len() {
             match &self.structures.lights[light] {
-                LightShadows::Area(tree) => self.illuminate_softly(light, tree, &tile, work),
-                _ => self.illuminate(light, index, work),
+                LightShadows::Area(tree) => self.illuminate_softly(light, tree.light(), &tile, work),
+                _ => match self.ends[light].as_ref().and_then(|plan| plan.area.as_ref()) {
+                    Some(area) => self.illuminate_softly(light, area, &tile, work),
+                    None => self.illuminate(light, index, work),
+                },
             }
         }
         for point in &work.points {
             out.color_row(point.y)[point.x as usize] += point.color * point.weight;
         }
+        self.go_on(&tile, work, out);
         TileCounts {
-            shadow_rays: work.scratch.counts.receivers + work.area.counts.samples,
+            shadow_rays: work.scratch.counts.receivers + work.area.counts.samples + work.bounce.shadow_rays,
+            secondary_rays: work.bounce.secondary_rays,
             exact_pixels: if traced { 0 } else { work.hits.exact_pixels as u64 },
             lit_by_cell: work.scratch.counts.lit_by_cell + work.area.counts.untested,
         }
@@ -139,7 +159,33 @@ impl TileShader<'_> {
     /// Notes the surfaces that a pixel sees, front to back until they cover it; returns the pixel without their
     /// light. The layers are those of the first surface of which anything is seen.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
-        let background = Sample::background(self.options.background);
+        let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
+        let backdrop = || self.backdrop(ray.dir.normalize().as_vec3());
+        let mut seen = Seen {
+            sample: Sample::background(Vec3::ZERO),
+            left: 1.0,
+        };
+        if let Some(every) = &self.reference {
+            self.see_each(every, [x, y], &ray, &mut seen, work);
+        } else {
+            self.see_through(tile, [x, y], &ray, &mut seen, work);
+        }
+        seen.sample.alpha = 1.0 - seen.left;
+        if seen.left > 0.0 {
+            seen.sample.color = backdrop() * seen.left;
+        }
+        seen.sample
+    }
+
+    /// Notes the surfaces that a pixel sees by the camera's grids.
+    fn see_through(
+        &self,
+        tile: &Tile,
+        [x, y]: [u32; 2],
+        ray: &ViewRay,
+        seen: &mut Seen,
+        work: &mut TileWork,
+    ) {
         let TileWork {
             hits, veils, points, ..
         } = work;
@@ -151,16 +197,8 @@ impl TileShader<'_> {
             .structures
             .seen(tile, x, y)
             .unwrap_or_else(|| hits.prim(x, y));
-        if opaque.is_none() && through.is_empty() {
-            return background;
-        }
-        let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
-        let mut seen = Seen {
-            sample: background,
-            left: 1.0,
-        };
         for veil in through {
-            self.note([x, y], &ray, veil.prim, &veil.hit, &mut seen, points);
+            self.note([x, y], ray, veil.prim, &veil.hit, seen, points);
             if seen.left < INVISIBLE {
                 seen.left = 0.0;
                 break;
@@ -169,11 +207,30 @@ impl TileShader<'_> {
         if let Some(prim) = opaque.filter(|_| seen.left > 0.0)
             && let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))
         {
-            self.note([x, y], &ray, prim, &hit, &mut seen, points);
+            self.note([x, y], ray, prim, &hit, seen, points);
         }
-        seen.sample.alpha = 1.0 - seen.left;
-        seen.sample.color = self.options.background * seen.left;
-        seen.sample
+    }
+
+    /// As [`Self::see_through`], every triangle tested.
+    fn see_each(
+        &self,
+        every: &EveryTriangle,
+        pixel: [u32; 2],
+        ray: &ViewRay,
+        seen: &mut Seen,
+        work: &mut TileWork,
+    ) {
+        every.along(ray, &mut work.along);
+        for &(_, prim) in &work.along {
+            let corners = triangles(self.geometry).corners(prim);
+            if let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) {
+                self.note(pixel, ray, prim, &hit, seen, &mut work.points);
+            }
+            if seen.left < INVISIBLE {
+                seen.left = 0.0;
+                break;
+            }
+        }
     }
 
     /// Notes a surface where a ray meets it, if any of it is seen.
@@ -220,7 +277,7 @@ impl TileShader<'_> {
             y,
             receiver: Receiver::along(ray, hit.t, prim),
             weight,
-            color: ambient(&surface, self.options.ambient),
+            color: self.resting(&surface, 0),
             surface,
         });
     }
@@ -244,6 +301,7 @@ impl TileShader<'_> {
             scratch,
             veil_scratch,
             passed,
+            filters,
             ..
         } = work;
         receivers.clear();
@@ -258,6 +316,7 @@ impl TileShader<'_> {
         }
         match &self.structures.lights[light] {
             LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
+            LightShadows::Reference => self.shadowed_by_any(light, receivers, shadow),
             LightShadows::Nothing | LightShadows::Pixels(_) | LightShadows::Area(_) => {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
@@ -268,10 +327,29 @@ impl TileShader<'_> {
         receivers.retain(|_| kept.next() == Some(true));
         let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
         asked.retain(|_| kept.next() == Some(true));
-        self.pass(light, receivers, veil_scratch, passed);
+        if let (Some(every), Some(plan)) = (&self.reference, &self.ends[light]) {
+            let share = |receiver| self.transmittance(every, receiver, &plan.light, filters);
+            passed.clear();
+            passed.extend(receivers.iter().map(share));
+        } else {
+            self.pass(light, receivers, veil_scratch, passed);
+        }
         for (&(i, radiance), &passed) in asked.iter().zip(&*passed) {
             points[i as usize].color += radiance * passed;
         }
+    }
+
+    /// Which receivers an opaque triangle hides from a light, all tested.
+    fn shadowed_by_any(&self, light: usize, receivers: &[Receiver], shadow: &mut Vec<bool>) {
+        if let (Some(every), Some(plan)) = (&self.reference, &self.ends[light]) {
+            every.shadowed(&|prim| self.is_opaque(prim), &plan.light, receivers, shadow);
+        }
+    }
+
+    /// Whether a triangle lets no light through.
+    pub(crate) fn is_opaque(&self, prim: u32) -> bool {
+        let object = object_of(self.geometry, prim);
+        self.shader.is_opaque(self.geometry, object)
     }
 
     /// Whether a light is on the side of a surface that the eye sees. Casters are chosen by the same decision, so
@@ -311,13 +389,25 @@ impl TileShader<'_> {
     }
 
     /// As [`Self::pass`], of one receiver and any light.
-    fn transmittance(&self, bvh: &Bvh, receiver: &Receiver, light: &Light, filters: &mut Vec<u32>) -> Vec3 {
-        let (origin, dir) = exact::shadow_line(receiver, light);
+    fn transmittance(
+        &self,
+        all: &dyn SecondaryTracer,
+        receiver: &Receiver,
+        light: &Light,
+        filters: &mut Vec<u32>,
+    ) -> Vec3 {
         filters.clear();
-        bvh.each_shadow(receiver, light, &mut (), |prim| {
+        all.each_between(receiver, light, &mut |prim| {
             filters.push(prim);
             ControlFlow::Continue(())
         });
+        self.let_through(receiver, light, filters)
+    }
+
+    /// Share of the light that these triangles between a receiver and a light let through.
+    pub(crate) fn let_through(&self, receiver: &Receiver, light: &Light, filters: &mut [u32]) -> Vec3 {
+        let (origin, dir) = exact::shadow_line(receiver, light);
+        // In a fixed order: the product of rounded numbers depends on it.
         filters.sort_unstable();
         let (geometry, tinted) = (self.geometry, self.options.tinted_shadows);
         let passed = |&prim: &u32| {

@@ -144,8 +144,15 @@ fn a_shutter_over_a_still_scene_changes_nothing() {
     let scene = builtin::build("walker").expect("it is built in");
     let frame = scene.at(0.3);
     let again = scene.at(0.3);
-    let still = render(&scene, &frame, &options(4));
-    let opened = open(&scene, [&frame, &again], &options(4));
+    let sharp = RenderOptions {
+        lens: Some(Lens {
+            radius: 0.0,
+            focus: 9.0,
+        }),
+        ..options(4)
+    };
+    let still = render(&scene, &frame, &sharp);
+    let opened = open(&scene, [&frame, &again], &sharp);
     assert_eq!(still.film.color, opened.film.color);
     // Layers are those of the middle of the pixel, as without samples.
     let plain = render(&scene, &frame, &options(1));

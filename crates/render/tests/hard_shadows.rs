@@ -80,6 +80,7 @@ fn check(name: &str, time: f32, size: [u32; 2], alter: impl Fn(&mut FrameGeometr
     let options = RenderOptions {
         width: size[0],
         height: size[1],
+        bounces: 0,
         layers: Layers {
             prim: true,
             ..Layers::default()

@@ -106,6 +106,7 @@ fn check(name: &str, size: [u32; 2], lights: impl Fn(&FrameGeometry) -> Vec<Pose
         height: size[1],
         samples,
         seed: 3,
+        bounces: 0,
         ..RenderOptions::default()
     };
     let frame = CameraFrame::new(&camera, geometry.origin, size[0], size[1]).expect("valid camera");
@@ -305,6 +306,7 @@ fn the_papers_way_is_the_share_of_the_light_that_is_seen() {
             width: 96,
             height: 64,
             samples: 4,
+            bounces: 0,
             paper,
             shadows,
             ..RenderOptions::default()
@@ -320,6 +322,7 @@ fn the_papers_way_is_the_share_of_the_light_that_is_seen() {
         &RenderOptions {
             width: 96,
             height: 64,
+            bounces: 0,
             paper: true,
             ..RenderOptions::default()
         },

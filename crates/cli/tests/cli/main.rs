@@ -4,6 +4,7 @@ mod animate;
 mod bad_input;
 mod bench;
 mod commands;
+mod environment;
 mod render;
 #[cfg(target_os = "linux")]
 mod signals;

@@ -5,34 +5,25 @@
 //! seen.
 
 use glam::Vec3;
-use rayward_trace::{AreaLight, AreaLightTree, Light, Receiver, Samples, Tile, exact};
+use rayward_trace::{AreaLight, Light, Receiver, Samples, Tile, exact};
 
 use super::{TileShader, TileWork};
 use crate::RenderOptions;
 use crate::geometry::triangles;
 use crate::shade::{direct, direct_from};
+use crate::structures::LightShadows;
 
-/// The samples of a light: each light has sets of its own.
-pub(crate) fn samples(options: &RenderOptions, light: usize) -> Samples {
-    Samples::new(
-        options.samples,
-        options
-            .seed
-            .wrapping_add((light as u32).wrapping_mul(0x9e37_79b9)),
-    )
+/// The samples of a light: each light, and each sample of the pixels, has sets of its own.
+pub(crate) fn samples(options: &RenderOptions, light: usize, sample: u32) -> Samples {
+    let own = (light as u32).wrapping_mul(0x9e37_79b9);
+    let own = own.wrapping_add(sample.wrapping_mul(0xc2b2_ae35));
+    Samples::new(options.samples, options.seed.wrapping_add(own))
 }
 
 impl TileShader<'_> {
     /// Adds the light of one source with a size to all points of the tile that it reaches.
-    pub(super) fn illuminate_softly(
-        &self,
-        light: usize,
-        tree: &AreaLightTree,
-        tile: &Tile,
-        work: &mut TileWork,
-    ) {
-        let samples = samples(self.options, light);
-        let area = tree.light();
+    pub(super) fn illuminate_softly(&self, light: usize, area: &AreaLight, tile: &Tile, work: &mut TileWork) {
+        let samples = samples(self.options, light, self.sample);
         work.receivers.clear();
         work.pixels.clear();
         work.asked.clear();
@@ -52,13 +43,23 @@ impl TileShader<'_> {
                 work.asked.push((i as u32, radiance));
             }
         }
-        tree.visible(
-            &work.receivers,
-            &work.pixels,
-            &samples,
-            &mut work.area,
-            &mut work.visible,
-        );
+        match (&self.structures.lights[light], &self.reference) {
+            (LightShadows::Area(tree), _) => tree.visible(
+                &work.receivers,
+                &work.pixels,
+                &samples,
+                &mut work.area,
+                &mut work.visible,
+            ),
+            (_, Some(every)) => every.visible(
+                &|prim| self.is_opaque(prim),
+                area,
+                &samples,
+                (&work.receivers, &work.pixels),
+                &mut work.visible,
+            ),
+            _ => return,
+        }
         let share = 1.0 / samples.count() as f32;
         for n in 0..work.asked.len() {
             let visible = &work.visible[n * samples.words()..(n + 1) * samples.words()];
@@ -81,8 +82,8 @@ impl TileShader<'_> {
                     direct_from(surface, &self.lights[light], area, &end).map(|incident| incident.radiance)
                 };
                 if let Some(sent) = sent {
-                    let passed = match &self.structures.layers {
-                        Some(bvh) => self.transmittance(bvh, &receiver, &end, &mut work.filters),
+                    let passed = match self.structures.layers.as_deref() {
+                        Some(all) => self.transmittance(all, &receiver, &end, &mut work.filters),
                         None => Vec3::ONE,
                     };
                     sum += sent * passed;

@@ -38,6 +38,39 @@ pub enum ToneMap {
     PreviousFrame,
 }
 
+impl ToneMap {
+    /// The same operator with another exposure; the others stay as they are.
+    pub fn exposed(self, stops: f32) -> Self {
+        match self {
+            Self::Exposure { .. } => Self::Exposure { stops },
+            Self::Aces { .. } => Self::Aces { stops },
+            Self::None | Self::PreviousFrame => self,
+        }
+    }
+}
+
+/// The exposure, in stops, that makes a picture's log average luminance the mid grey of 18 % (Reinhard et al.,
+/// *Photographic Tone Reproduction for Digital Images*, SIGGRAPH 2002, §2). Black pixels and such that are not
+/// finite do not count; 0 if none are left.
+pub fn automatic_exposure(colors: &[Vec3]) -> f32 {
+    let logarithms = |colors: &[Vec3]| {
+        let luminances = colors.iter().map(|c| c.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
+        let shown = luminances.filter(|l| l.is_finite() && *l > 1e-6);
+        shown.fold((0.0, 0u64), |(sum, count), l| {
+            (sum + f64::from(l).log2(), count + 1)
+        })
+    };
+    let blocks: Vec<_> = colors.par_chunks(BLOCK).map(logarithms).collect();
+    let (sum, count) = blocks
+        .into_iter()
+        .fold((0.0, 0), |(sum, count), block| (sum + block.0, count + block.1));
+    if count == 0 {
+        0.0
+    } else {
+        (0.18f64.log2() - sum / count as f64) as f32
+    }
+}
+
 /// Smallest and largest colour component of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntensityRange {
@@ -235,6 +268,26 @@ mod tests {
         let whole = IntensityRange::of(&colors);
         let tiles = colors.chunks(77).rev().map(IntensityRange::of);
         assert_eq!(tiles.fold(IntensityRange::EMPTY, IntensityRange::union), whole);
+    }
+
+    #[test]
+    fn the_automatic_exposure_makes_the_middle_grey() {
+        let colors = [
+            Vec3::splat(0.045),
+            Vec3::splat(0.72),
+            Vec3::ZERO,
+            Vec3::NAN,
+            Vec3::INFINITY,
+        ];
+        assert!(
+            automatic_exposure(&colors).abs() < 1e-5,
+            "their geometric mean is 0.18"
+        );
+        let brighter = colors.map(|c| c * 8.0);
+        assert!((automatic_exposure(&brighter) + 3.0).abs() < 1e-5);
+        assert_eq!(automatic_exposure(&[Vec3::ZERO]), 0.0);
+        let map = ToneMap::Aces { stops: 0.0 };
+        assert_eq!(map.exposed(2.0), ToneMap::Aces { stops: 2.0 });
     }
 
     #[test]

@@ -1,0 +1,184 @@
+//! The light of surfaces that paths have come to: from lights, and from an environment.
+//!
+//! Shadows are asked of the general structure, both sides of all triangles casting: the rule by which back faces
+//! alone may cast is one about what the eye sees.
+//!
+//! The environment lights a surface twice over: by directions drawn by importance from the environment, and by the
+//! rays drawn from the surface's lobes that meet nothing. Each counts with its share of the two densities (the
+//! balance heuristic of Veach and Guibas 1995), lobe by lobe, so a mirror sees the environment by its ray alone and
+//! plaster by drawn directions.
+
+use std::ops::ControlFlow;
+
+use glam::Vec3;
+use rayward_trace::{AreaLight, Light, Receiver, exact};
+
+use super::{Arrival, BounceWork, Flight, SURROUNDING};
+use crate::geometry::triangles;
+use crate::secondary::SecondaryTracer;
+use crate::shade::{Traced, brdf, direct, direct_from, lobes};
+use crate::tile::{TileShader, soft};
+use crate::{ShadingLight, Surface};
+
+impl TileShader<'_> {
+    /// Adds the light of all sources to the arrivals that they reach.
+    pub(super) fn illuminate_arrivals(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork) {
+        for (index, (light, end)) in self.lights.iter().zip(self.ends).enumerate() {
+            for arrival in &mut work.arrivals {
+                let Some(plan) = end else {
+                    if let Some(incident) = direct(&arrival.surface, light) {
+                        arrival.color += incident.radiance;
+                    }
+                    continue;
+                };
+                if let Some(area) = &plan.area {
+                    let (light, filters) = ((index, light, area), &mut work.filters);
+                    arrival.color += self.soft_light(tracer, arrival, light, filters, &mut work.shadow_rays);
+                } else if let Some(incident) = direct(&arrival.surface, light)
+                    && self.is_turned_to(&plan.light, &arrival.receiver, &arrival.seen_from)
+                {
+                    work.shadow_rays += 1;
+                    let passed = self.passed(tracer, &arrival.receiver, &plan.light, &mut work.filters);
+                    arrival.color += incident.radiance * passed;
+                }
+            }
+        }
+    }
+
+    /// Mean of what an arrival receives from the samples of a light with a size.
+    fn soft_light(
+        &self,
+        tracer: &dyn SecondaryTracer,
+        arrival: &Arrival,
+        (index, light, area): (usize, &ShadingLight, &AreaLight),
+        filters: &mut Vec<u32>,
+        asked: &mut u64,
+    ) -> Vec3 {
+        let Arrival {
+            surface, receiver, ..
+        } = arrival;
+        if surface.unlit || !area.shines_at(receiver.point) {
+            return Vec3::ZERO;
+        }
+        let samples = soft::samples(self.options, index, self.sample);
+        let mut sum = Vec3::ZERO;
+        for k in 0..samples.count() {
+            let end = area.sample(&samples, arrival.path.0, receiver.point, k);
+            if let Some(incident) = direct_from(surface, light, area, &end)
+                && self.is_turned_to(&end, receiver, &arrival.seen_from)
+            {
+                *asked += 1;
+                sum += incident.radiance * self.passed(tracer, receiver, &end, filters);
+            }
+        }
+        sum / samples.count() as f32
+    }
+
+    /// Adds the light of the environment to all arrivals, by this many directions each.
+    pub(super) fn surround(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork, directions: u32) {
+        let Some(environment) = self.environment else {
+            return;
+        };
+        for arrival in &mut work.arrivals {
+            let surface = &arrival.surface;
+            if surface.unlit || arrival.weight == Vec3::ZERO {
+                continue;
+            }
+            let traced = self.traced(surface, arrival.bounces);
+            let rays = [
+                self.reflected_rays(surface, arrival.bounces),
+                self.diffused_rays(surface, arrival.bounces),
+            ];
+            for i in 0..directions {
+                let random = self.draw(arrival.path, SURROUNDING, self.sample * directions + i);
+                let sample = environment.sample(random);
+                let towards = sample.towards;
+                let cos = surface.normal.dot(towards);
+                if cos <= 0.0 || surface.geometric_normal.dot(towards) <= 0.0 {
+                    continue;
+                }
+                let drawn = directions as f32 * sample.density;
+                let lit = lobes_lit(surface, towards, traced, rays, drawn) * (cos / drawn) * sample.radiance;
+                if lit.max_element() <= 0.0 {
+                    continue;
+                }
+                work.shadow_rays += 1;
+                let end = Light::Directional(towards);
+                arrival.color += lit * self.passed(tracer, &arrival.receiver, &end, &mut work.filters);
+            }
+        }
+    }
+
+    /// Radiance where a ray meets nothing.
+    pub(super) fn beyond(&self, flight: &Flight) -> Vec3 {
+        match self.environment {
+            Some(environment) => {
+                let towards = flight.ray.dir;
+                let drawn = flight.drawn * environment.density(towards);
+                let share = if drawn > 0.0 && flight.density.is_finite() {
+                    flight.density / (flight.density + drawn)
+                } else {
+                    1.0
+                };
+                environment.radiance(towards) * share
+            }
+            None if flight.diffuse => self.options.ambient,
+            None => self.options.background,
+        }
+    }
+
+    /// Share of a light that reaches a receiver.
+    fn passed(
+        &self,
+        tracer: &dyn SecondaryTracer,
+        receiver: &Receiver,
+        end: &Light,
+        filters: &mut Vec<u32>,
+    ) -> Vec3 {
+        if !self.options.shadows {
+            return Vec3::ONE;
+        }
+        filters.clear();
+        let some_pass = self.structures.transparent;
+        let mut blocked = false;
+        tracer.each_between(receiver, end, &mut |prim| {
+            blocked = !some_pass || self.is_opaque(prim);
+            filters.push(prim);
+            if blocked {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        if blocked {
+            return Vec3::ZERO;
+        }
+        self.let_through(receiver, end, filters)
+    }
+
+    /// Whether a light is on the side of a receiver's triangle that is seen from a place.
+    fn is_turned_to(&self, end: &Light, receiver: &Receiver, seen_from: &Light) -> bool {
+        let corners = triangles(self.geometry).corners(receiver.prim);
+        let (lit, seen) = (exact::side(corners, end), exact::side(corners, seen_from));
+        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+    }
+}
+
+/// The reflection model, each lobe with the share that drawn directions have of its light. Reflection and diffusion draw
+/// as many rays as given.
+fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], drawn: f32) -> Vec3 {
+    let density = |traced: bool, density: fn(&Surface, Vec3) -> f32, rays: u32| {
+        if traced {
+            rays as f32 * density(surface, towards)
+        } else {
+            0.0
+        }
+    };
+    let diffused = density(traced.diffusion, lobes::diffusion_density, rays[1]);
+    let mut lit = brdf::diffuse(surface, towards) * (drawn / (drawn + diffused));
+    if !lobes::is_smooth(surface) {
+        let reflected = density(traced.reflection, lobes::reflection_density, rays[0]);
+        lit += brdf::specular(surface, towards) * (drawn / (drawn + reflected));
+    }
+    lit
+}

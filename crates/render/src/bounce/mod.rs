@@ -1,0 +1,412 @@
+//! Rays that leave what a tile sees: reflections, refractions and, on request, diffuse light from other surfaces
+//! (VMV07 §1 traces the same rays after the first surfaces are known; its structure for them is another one).
+//!
+//! They go in waves, one a bounce: all rays of the tile are traced together, the surfaces they meet are lit, and send
+//! out the next wave. A surface that both reflects and transmits sends out both rays; none is dropped by chance, only
+//! where less than [`FAINT`] of the pixel is left. Rough lobes of what the eye sees draw as many rays as a light with
+//! a size has samples, times the share of light that they pass on; those of later surfaces draw one.
+//!
+//! ```text
+//! depart: surface --lobes--> flights --SecondaryTracer--> arrive: surface --light--> lit, departs again
+//!                                            '--nothing met--> beyond: environment or background
+//! ```
+//!
+//! Limits: a volume inside of another one ends the outer one. Reflections rougher than [`GLOSSY`] see the
+//! environment but no surfaces unless diffuse light is traced, too. Lights do not shine through boundaries of
+//! volumes, which cast shadows like all else: such light is found only by diffuse rays that meet the glass.
+
+mod light;
+
+use glam::Vec3;
+use rayward_trace::{Light, Receiver, Samples, SurfaceRay, Tile, exact};
+
+use crate::secondary::{SecondaryTracer, SurfaceHit};
+use crate::shade::lobes::{self, Lobe};
+use crate::shade::{Traced, around, brdf, object_of};
+use crate::tile::{TileShader, TileWork};
+use crate::{Surface, SurfacePoint, TileMut};
+
+/// Roughness above which reflections of surfaces are not traced unless diffuse light is.
+pub(crate) const GLOSSY: f32 = 0.4;
+
+/// A ray of which less than this reaches the pixel is not sent.
+const FAINT: f32 = 1.0 / 4096.0;
+
+/// Masked and blended surfaces, and thin walls, that a ray passes at most.
+const MOST_PASSED: u32 = 64;
+
+/// Purposes of random numbers; the first choices at a surface are those of rays.
+const REFLECTED: u32 = 1;
+const TRANSMITTED: u32 = 2;
+const DIFFUSED: u32 = 3;
+const SURROUNDING: u32 = 4;
+
+/// Which of all paths of a frame this is: what its random numbers depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Path(u32);
+
+impl Path {
+    /// The path that goes on from this one by one choice among several.
+    fn branch(self, choice: u32) -> Self {
+        Self(self.0.wrapping_mul(0x2c1b_3c6d).wrapping_add(choice))
+    }
+}
+
+/// A ray on its way, with all it will need where it arrives.
+#[derive(Clone, Copy, Debug)]
+struct Flight {
+    pixel: [u32; 2],
+    /// Share of what it meets that the pixel shows.
+    weight: Vec3,
+    ray: SurfaceRay,
+    /// Density with which its direction was drawn, and how many directions were drawn from the environment there.
+    density: f32,
+    drawn: f32,
+    /// Bounces up to here, and surfaces passed since.
+    bounces: u32,
+    passed: u32,
+    /// Absorption of the volume it runs in.
+    absorption: Vec3,
+    /// Whether it sees the surrounding light where nothing is, instead of the background.
+    diffuse: bool,
+    cone: Cone,
+    path: Path,
+}
+
+/// Width of the pixel's footprint along a ray, metres, and its growth per metre.
+#[derive(Clone, Copy, Debug)]
+struct Cone {
+    width: f32,
+    spread: f32,
+}
+
+/// A surface that a path has come to.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    pixel: [u32; 2],
+    weight: Vec3,
+    surface: Surface,
+    receiver: Receiver,
+    bounces: u32,
+    cone: Cone,
+    path: Path,
+    /// Absorption of the volume the path came through.
+    absorption: Vec3,
+    /// From where the surface is seen.
+    seen_from: Light,
+    /// Light it sends back along the path.
+    color: Vec3,
+}
+
+/// Working memory of one thread.
+#[derive(Debug, Default)]
+pub(crate) struct BounceWork {
+    flights: Vec<Flight>,
+    next: Vec<Flight>,
+    rays: Vec<SurfaceRay>,
+    hits: Vec<SurfaceHit>,
+    arrivals: Vec<Arrival>,
+    filters: Vec<u32>,
+    /// Rays from surfaces to others, and to lights and the environment.
+    pub(crate) secondary_rays: u64,
+    pub(crate) shadow_rays: u64,
+}
+
+impl TileShader<'_> {
+    /// Point `k` of the random ones that a path has for a purpose.
+    fn draw(&self, path: Path, purpose: u32, k: u32) -> [f32; 2] {
+        let seed = self.options.seed.wrapping_add(purpose.wrapping_mul(0x85eb_ca6b));
+        Samples::new(1, seed).point(path.0, k)
+    }
+
+    /// Which lobes of a surface go on after this many bounces.
+    fn traced(&self, surface: &Surface, bounces: u32) -> Traced {
+        if self.secondary.is_none() || surface.unlit || bounces >= self.options.bounces {
+            return Traced::default();
+        }
+        let diffusion = bounces < self.options.diffuse_bounces;
+        Traced {
+            reflection: diffusion || surface.roughness <= GLOSSY,
+            transmission: surface.transmission > 0.0,
+            diffusion,
+        }
+    }
+
+    /// Light of a surface that comes neither from a light nor along a traced ray: its own, and that from around.
+    pub(crate) fn resting(&self, surface: &Surface, bounces: u32) -> Vec3 {
+        let surrounding = if self.environment.is_some() {
+            Vec3::ZERO
+        } else {
+            self.options.ambient
+        };
+        let traced = self.traced(surface, bounces);
+        let mut light = around(surface, surrounding, traced);
+        if let Some(environment) = self.environment
+            && !traced.reflection
+            && !surface.unlit
+            && lobes::is_smooth(surface)
+            && let Some(lobe) = lobes::reflected(surface, [0.5; 2])
+        {
+            // No direction that is drawn from the environment falls into a mirror's lobe.
+            light += lobe.weight * environment.radiance(lobe.towards);
+        }
+        light
+    }
+
+    /// What is seen where no surface is.
+    pub(crate) fn backdrop(&self, towards: Vec3) -> Vec3 {
+        match self.environment {
+            Some(environment) if self.options.show_environment => environment.radiance(towards),
+            _ => self.options.background,
+        }
+    }
+
+    /// Adds what the points that a tile sees receive from the environment and from other surfaces.
+    pub(crate) fn go_on(&self, tile: &Tile, work: &mut TileWork, out: &mut TileMut) {
+        let Some(tracer) = self.secondary else {
+            return;
+        };
+        let TileWork { points, bounce, .. } = work;
+        (bounce.secondary_rays, bounce.shadow_rays) = (0, 0);
+        bounce.arrivals.clear();
+        bounce.arrivals.extend(points.iter().map(|point| {
+            let depth = (point.receiver.point - self.camera.eye.as_dvec3()).dot(self.camera.forward);
+            let [x, y] = [tile.x + point.x, tile.y + point.y];
+            Arrival {
+                pixel: [point.x, point.y],
+                weight: Vec3::splat(point.weight),
+                surface: point.surface,
+                receiver: point.receiver,
+                bounces: 0,
+                cone: self.cone(depth as f32),
+                path: Path(y.wrapping_mul(self.camera.width).wrapping_add(x)),
+                absorption: Vec3::ZERO,
+                seen_from: self.eye,
+                color: Vec3::ZERO,
+            }
+        }));
+        self.surround(tracer, bounce, self.options.environment_samples);
+        for arrival in &bounce.arrivals {
+            add(out, arrival.pixel, arrival.weight * arrival.color);
+        }
+        self.follow(tracer, bounce, out);
+    }
+
+    /// The footprint of a pixel where its ray has this depth.
+    fn cone(&self, depth: f32) -> Cone {
+        Cone {
+            width: self.camera.footprint(depth),
+            spread: if self.camera.orthographic {
+                0.0
+            } else {
+                self.camera.footprint(1.0)
+            },
+        }
+    }
+
+    /// Follows the paths that go on from these arrivals, which are lit already, and adds what they bring.
+    fn follow(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork, out: &mut TileMut) {
+        work.next.clear();
+        for arrival in &work.arrivals {
+            self.depart(arrival, &mut work.next);
+        }
+        while !work.next.is_empty() {
+            std::mem::swap(&mut work.flights, &mut work.next);
+            work.rays.clear();
+            work.rays.extend(work.flights.iter().map(|flight| flight.ray));
+            tracer.trace(&work.rays, &mut work.hits);
+            work.secondary_rays += work.rays.len() as u64;
+            work.arrivals.clear();
+            work.next.clear();
+            for (flight, hit) in work.flights.iter().zip(&work.hits) {
+                match hit {
+                    Some(hit) => self.arrive(flight, hit, &mut work.arrivals, &mut work.next),
+                    None => add(out, flight.pixel, flight.weight * self.beyond(flight)),
+                }
+            }
+            self.illuminate_arrivals(tracer, work);
+            self.surround(tracer, work, 1);
+            for arrival in &work.arrivals {
+                add(out, arrival.pixel, arrival.weight * arrival.color);
+                self.depart(arrival, &mut work.next);
+            }
+        }
+    }
+
+    /// The surface that a ray meets; a ray that it lets pass goes on.
+    fn arrive(
+        &self,
+        flight: &Flight,
+        &(prim, hit): &(u32, exact::ExactHit),
+        arrivals: &mut Vec<Arrival>,
+        next: &mut Vec<Flight>,
+    ) {
+        let length = flight.ray.dir.length();
+        let distance = hit.t as f32 * length;
+        let cone = Cone {
+            width: flight.cone.width + flight.cone.spread * distance,
+            ..flight.cone
+        };
+        let surface = self.shader.surface(
+            self.geometry,
+            &SurfacePoint {
+                prim,
+                object: object_of(self.geometry, prim),
+                u: hit.u as f32,
+                v: hit.v as f32,
+                view: -flight.ray.dir / length,
+                footprint: cone.width,
+            },
+        );
+        // A ray that leaves a volume it did not enter has been in it from the start.
+        let inside = if !surface.front && !surface.thin && flight.absorption == Vec3::ZERO {
+            surface.absorption * surface.transmission.ceil()
+        } else {
+            flight.absorption
+        };
+        let weight = flight.weight * absorbed(inside, distance);
+        let receiver = Receiver::along(&flight.ray.line(), hit.t, prim);
+        if surface.alpha < 1.0 && flight.passed < MOST_PASSED {
+            next.push(Flight {
+                weight: weight * (1.0 - surface.alpha),
+                ray: SurfaceRay {
+                    from: receiver,
+                    dir: flight.ray.dir,
+                },
+                passed: flight.passed + 1,
+                absorption: inside,
+                cone,
+                ..*flight
+            });
+        }
+        if surface.alpha > 0.0 {
+            arrivals.push(Arrival {
+                pixel: flight.pixel,
+                weight: weight * surface.alpha,
+                receiver,
+                bounces: flight.bounces,
+                cone,
+                path: flight.path,
+                absorption: inside,
+                seen_from: flight.ray.looked_at_from(),
+                color: self.resting(&surface, flight.bounces),
+                surface,
+            });
+        }
+    }
+
+    /// Sends out the rays of all lobes of a surface that are traced.
+    fn depart(&self, arrival: &Arrival, next: &mut Vec<Flight>) {
+        let surface = &arrival.surface;
+        let traced = self.traced(surface, arrival.bounces);
+        if traced.reflection {
+            let rays = self.reflected_rays(surface, arrival.bounces);
+            let draw = |random| lobes::reflected(surface, random);
+            self.send(arrival, REFLECTED, rays, arrival.absorption, draw, next);
+        }
+        if traced.transmission {
+            let behind = match (surface.thin, surface.enters_volume()) {
+                (true, _) => arrival.absorption,
+                (false, true) => surface.absorption,
+                (false, false) => Vec3::ZERO,
+            };
+            let smooth = lobes::is_smooth(surface);
+            let rays = self.rays(arrival.bounces, smooth, surface.transmission);
+            let draw = |random| lobes::transmitted(surface, random);
+            self.send(arrival, TRANSMITTED, rays, behind, draw, next);
+        }
+        if traced.diffusion {
+            let rays = self.diffused_rays(surface, arrival.bounces);
+            let draw = |random| lobes::diffused(surface, random);
+            self.send(arrival, DIFFUSED, rays, arrival.absorption, draw, next);
+        }
+    }
+
+    /// How many rays a lobe draws that passes on about this share of its light.
+    fn rays(&self, bounces: u32, smooth: bool, share: f32) -> u32 {
+        if bounces > 0 || smooth {
+            1
+        } else {
+            (self.options.samples as f32 * share.clamp(0.0, 1.0))
+                .ceil()
+                .max(1.0) as u32
+        }
+    }
+
+    /// As [`Self::rays`], of the reflection.
+    fn reflected_rays(&self, surface: &Surface, bounces: u32) -> u32 {
+        let share = brdf::reflectance(surface, surface.normal.dot(surface.view)).max_element();
+        self.rays(bounces, lobes::is_smooth(surface), share)
+    }
+
+    /// As [`Self::rays`], of diffuse light.
+    fn diffused_rays(&self, surface: &Surface, bounces: u32) -> u32 {
+        self.rays(bounces, false, surface.base_color.max_element())
+    }
+
+    /// Sends out the rays of one lobe.
+    fn send(
+        &self,
+        arrival: &Arrival,
+        purpose: u32,
+        rays: u32,
+        absorption: Vec3,
+        draw: impl Fn([f32; 2]) -> Option<Lobe>,
+        next: &mut Vec<Flight>,
+    ) {
+        let surface = &arrival.surface;
+        let drawn = match (self.environment, arrival.bounces) {
+            (None, _) => 0.0,
+            (Some(_), 0) => self.options.environment_samples as f32,
+            (Some(_), _) => 1.0,
+        };
+        for i in 0..rays {
+            let k = self.sample * rays + i;
+            let Some(lobe) = draw(self.draw(arrival.path, purpose, k)) else {
+                continue;
+            };
+            let weight = arrival.weight * lobe.weight;
+            if weight.max_element() < FAINT {
+                continue;
+            }
+            // Rough lobes blur what they see: a share of their width stands for that of the pixel.
+            let spread = if lobe.density.is_finite() {
+                (1.0 / (1.0 + lobe.density)).sqrt() * 0.25
+            } else {
+                0.0
+            };
+            next.push(Flight {
+                pixel: arrival.pixel,
+                weight: weight / rays as f32,
+                ray: SurfaceRay {
+                    from: arrival.receiver,
+                    dir: lobe.towards,
+                },
+                density: lobe.density * rays as f32,
+                drawn,
+                bounces: arrival.bounces + 1,
+                passed: 0,
+                absorption,
+                diffuse: purpose == DIFFUSED || (purpose == REFLECTED && surface.roughness > GLOSSY),
+                cone: Cone {
+                    spread: arrival.cone.spread.max(spread),
+                    ..arrival.cone
+                },
+                path: arrival.path.branch(purpose + 4 * i),
+            });
+        }
+    }
+}
+
+/// What a volume leaves of light after this distance (Beer and Lambert).
+fn absorbed(absorption: Vec3, distance: f32) -> Vec3 {
+    if absorption == Vec3::ZERO {
+        Vec3::ONE
+    } else {
+        (absorption * -distance).exp()
+    }
+}
+
+fn add(out: &mut TileMut, [x, y]: [u32; 2], light: Vec3) {
+    out.color_row(y)[x as usize] += light;
+}
