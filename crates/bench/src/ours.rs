@@ -5,6 +5,7 @@
 
 use std::sync::Mutex;
 
+use glam::DVec3;
 use rayon::prelude::*;
 use rayward::trace::{
     AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Facets, Light, LightQuery,
@@ -129,7 +130,8 @@ impl Rayward {
     fn draw_soft(&self, job: &Job, eye: &EyeGrid, facets: &Facets, picture: &mut Picture) -> u64 {
         let triangles = job.scene.triangles();
         // Only both sides cast the shadow of a light with a size.
-        let tree = AreaLightTree::build(job.area, triangles, &|_| Casts::Both, job.level);
+        let tree = AreaLightTree::build(job.area, triangles, &|_| Casts::Both, job.level)
+            .with_topology(&job.scene.topology);
         let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
             let tile = eye.tile(out.index);
             eye.trace_tile(&tile, &mut work.hits);
@@ -144,7 +146,12 @@ impl Rayward {
                 &mut work.bits,
             );
             let bits = work.bits.chunks(job.samples.words());
-            for (&place, bits) in work.places.iter().zip(bits) {
+            for (&place, bits) in work
+                .places
+                .iter()
+                .zip(bits)
+                .filter(|(place, _)| **place != NOWHERE)
+            {
                 let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
                 let place = usize::from(place);
                 // The share of all samples as so many of the usual number.
@@ -154,7 +161,7 @@ impl Rayward {
             for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
                 darken(block, lit, SOFT_SAMPLES as u8);
             }
-            work.receivers.len() as u64 * u64::from(job.samples.count())
+            std::mem::take(&mut work.asking) * u64::from(job.samples.count())
         });
         tiles.sum()
     }
@@ -188,10 +195,13 @@ struct SoftWork {
     bits: Vec<u32>,
     scratch: AreaScratch,
     lit: Vec<[u8; BLOCK_LANES]>,
+    /// Receivers so far in the tile that ask.
+    asking: u64,
 }
 
 impl SoftWork {
-    /// The hits of a tile that are turned towards the light: blocks of 8 x 8 pixels, in these squares of 4 x 4.
+    /// The hits of a tile that are turned towards the light, squares of 4 x 4 pixels along a Z-curve. Pixels that do not ask
+    /// keep their places, so that sixteen receivers are a square and 256 a square of squares.
     fn receive(&mut self, view: &View, facets: &Facets, tile: &Tile, job: &Job) {
         self.receivers.clear();
         self.pixels.clear();
@@ -199,17 +209,36 @@ impl SoftWork {
         let (columns, rows) = (tile.width.div_ceil(4), tile.height.div_ceil(4));
         self.lit.clear();
         self.lit.resize((columns * rows) as usize, [0; BLOCK_LANES]);
-        for i in 0..columns.next_multiple_of(2) * rows.next_multiple_of(2) {
-            let (square, part) = (i / 4, i % 4);
-            let across = columns.div_ceil(2);
-            let column = square % across * 2 + part % 2;
-            let row = square / across * 2 + part / 2;
+        let mut asking = 0;
+        let side = columns.max(rows).next_power_of_two();
+        for i in 0..side * side {
+            let [column, row] = [i, i >> 1].map(compacted);
             if column < columns && row < rows {
-                self.receive_block(view, facets, tile, (job, columns), [column, row]);
+                asking += self.receive_block(view, facets, tile, (job, columns), [column, row]);
+            } else {
+                self.fill_up(BLOCK_LANES);
+            }
+            if i % BLOCKS_TOGETHER == BLOCKS_TOGETHER - 1 {
+                let first = self.receivers.len() - BLOCKS_TOGETHER as usize * BLOCK_LANES;
+                if asking == 0 {
+                    // Nobody in all of these: their places are not needed.
+                    self.receivers.truncate(first);
+                    self.pixels.truncate(first);
+                    self.places.truncate(first);
+                }
+                asking = 0;
             }
         }
     }
 
+    fn fill_up(&mut self, number: usize) {
+        let nobody = Receiver::free(DVec3::NAN);
+        self.receivers.extend(std::iter::repeat_n(nobody, number));
+        self.pixels.extend(std::iter::repeat_n(0, number));
+        self.places.extend(std::iter::repeat_n(NOWHERE, number));
+    }
+
+    /// Adds a square of 4 x 4 pixels; returns how many of them ask.
     fn receive_block(
         &mut self,
         view: &View,
@@ -217,20 +246,41 @@ impl SoftWork {
         tile: &Tile,
         (job, columns): (&Job, u32),
         [column, row]: [u32; 2],
-    ) {
+    ) -> usize {
         let triangles = job.scene.triangles();
         let block = (row * columns + column) as usize;
-        for (lane, &prim) in self.hits.block(column, row).prim.iter().enumerate() {
+        let mut asking = 0;
+        let prims = self.hits.block(column, row).prim;
+        for (lane, prim) in prims.into_iter().enumerate() {
             let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
-            if prim == u32::MAX || x >= tile.width || y >= tile.height || facets.facet(prim) <= 0.0 {
-                continue;
-            }
+            let sees = prim != u32::MAX && x < tile.width && y < tile.height && facets.facet(prim) > 0.0;
             let ray = view.pixel_ray(tile.x + x, tile.y + y);
-            if let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles.corners(prim)) {
-                self.receivers.push(Receiver::along(&ray, hit.t, prim));
-                self.pixels.push(sample_set(tile.x + x, tile.y + y));
-                self.places.push((block * BLOCK_LANES + lane) as u16);
+            let hit = sees.then(|| exact::attributes(ray.origin, ray.dir, triangles.corners(prim)));
+            match hit.flatten() {
+                Some(hit) => {
+                    self.receivers.push(Receiver::along(&ray, hit.t, prim));
+                    self.pixels.push(sample_set(tile.x + x, tile.y + y));
+                    self.places.push((block * BLOCK_LANES + lane) as u16);
+                    asking += 1;
+                }
+                None => self.fill_up(1),
             }
         }
+        self.asking += asking as u64;
+        asking
     }
+}
+
+/// The squares of 4 x 4 pixels that are searched for together.
+const BLOCKS_TOGETHER: u32 = 16;
+
+/// The place of nobody.
+const NOWHERE: u16 = u16::MAX;
+
+/// Every other bit of a number below 2^16.
+fn compacted(v: u32) -> u32 {
+    let v = v & 0x5555;
+    let v = (v | v >> 1) & 0x3333;
+    let v = (v | v >> 2) & 0x0f0f;
+    (v | v >> 4) & 0x00ff
 }

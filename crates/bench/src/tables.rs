@@ -118,10 +118,6 @@ pub struct RasterLine {
     pub mvertices_per_s: [f64; 2],
 }
 
-const OURS: Rayward = Rayward {
-    casters: CasterPolicy::Auto,
-};
-
 /// Measures everything.
 ///
 /// # Errors
@@ -156,6 +152,7 @@ pub fn measure(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Resul
 fn table_1(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<Vec<FrameLine>> {
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let (one, all) = (pool(1)?, pool(options.threads)?);
+    let ours = Rayward::new(CasterPolicy::Auto);
     let mut lines = Vec::new();
     for paper in &TABLE_1 {
         let mesh = options.folder.as_ref().and(paper.mesh);
@@ -170,7 +167,7 @@ fn table_1(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<Ve
                 for run in 0..=options.runs {
                     for (pool, times) in [&one, &all].into_iter().zip(&mut times) {
                         let (asked, time) =
-                            pool.install(|| Stopwatch::time(|| OURS.draw(&job, &mut picture)));
+                            pool.install(|| Stopwatch::time(|| ours.draw(&job, &mut picture)));
                         shadow_rays = asked;
                         if run > 0 {
                             times.push(time.wall);
@@ -215,7 +212,7 @@ fn build(job: &Job) {
 
 fn untested(job: &Job) -> f64 {
     let visibility = Visibility::trace(&eye_grid(job), &|| ());
-    let counts = OURS.lit(job, &visibility, job.light).counts;
+    let counts = Rayward::new(CasterPolicy::Auto).lit(job, &visibility, job.light).counts;
     counts.untested as f64 / counts.receivers.max(1) as f64
 }
 
@@ -290,6 +287,7 @@ fn table_4(options: &TablesOptions) -> Result<RasterLine> {
     };
     let mut scene = BenchScene::load(name, options.folder.as_deref())?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let ours = Rayward::new(CasterPolicy::Auto);
     let mut picture = Picture::new(side, side, tile_side());
     let covered = |scene: &BenchScene| -> Result<f64> {
         let job = Job::new(scene, [side; 2], FrameKind::Eye, options.level)?;
@@ -306,7 +304,7 @@ fn table_4(options: &TablesOptions) -> Result<RasterLine> {
     let mut rate = |scene: &BenchScene, items: usize| -> Result<f64> {
         let job = Job::new(scene, [side; 2], FrameKind::Eye, options.level)?;
         let mut draw = || {
-            pool.install(|| Stopwatch::time(|| OURS.draw(&job, &mut picture)))
+            pool.install(|| Stopwatch::time(|| ours.draw(&job, &mut picture)))
                 .1
                 .wall
         };

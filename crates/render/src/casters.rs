@@ -22,6 +22,11 @@ pub struct CasterRules<'t> {
 }
 
 impl<'t> CasterRules<'t> {
+    /// Which triangles hang together.
+    pub(crate) fn topology(&self) -> &'t Topology {
+        self.topology
+    }
+
     /// The rules for an eye at this point of the local frame; `None` for a parallel camera, which has no one
     /// point to be inside of anything.
     pub fn new(

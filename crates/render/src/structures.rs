@@ -63,7 +63,7 @@ impl<'g> FrameStructures<'g> {
         view: View,
         geometry: &'g FrameGeometry,
         clusters: &'g Clusters,
-        rules: &CasterRules,
+        rules: &CasterRules<'g>,
         eye_point: Light,
         options: &RenderOptions,
     ) -> Self {
@@ -274,14 +274,15 @@ fn shadows_of<'g>(
     plan: &LightPlan,
     visibility: Option<&Visibility>,
     (geometry, clusters): (&'g FrameGeometry, &Clusters),
-    rules: &CasterRules,
+    rules: &CasterRules<'g>,
     eye: Light,
     (level, scratch): (SimdLevel, &mut LitScratch),
 ) -> LightShadows<'g> {
     let triangles = triangles(geometry);
     if let Some(area) = plan.area {
         let rule = rules.for_area(geometry, &area);
-        return LightShadows::Area(AreaLightTree::build(area, triangles, &rule, level));
+        let tree = AreaLightTree::build(area, triangles, &rule, level);
+        return LightShadows::Area(tree.with_topology(rules.topology()));
     }
     let rule = rules.for_light(geometry, &plan.light);
     match visibility {

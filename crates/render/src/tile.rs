@@ -100,13 +100,17 @@ impl TileCounts {
     }
 }
 
-/// The pixels of a tile in squares of 8 x 8, and within these of 4 x 4: those that follow each other see surfaces close
-/// to each other.
+/// The pixels of a tile in squares of 16 x 16, within these of 8 x 8 and of 4 x 4: those that follow each other see surfaces
+/// close to each other.
 fn in_blocks(width: u32, height: u32) -> impl Iterator<Item = [u32; 2]> {
     let blocks = (0..height)
-        .step_by(8)
-        .flat_map(move |y| (0..width).step_by(8).map(move |x| [x, y]));
-    let squares = blocks.flat_map(|[x, y]| (0..4).map(move |i| [x + i % 2 * 4, y + i / 2 * 4]));
+        .step_by(16)
+        .flat_map(move |y| (0..width).step_by(16).map(move |x| [x, y]));
+    let quarters =
+        move |[x, y]: [u32; 2], side: u32| (0..4).map(move |i| [x + i % 2 * side, y + i / 2 * side]);
+    let squares = blocks
+        .flat_map(move |at| quarters(at, 8))
+        .flat_map(move |at| quarters(at, 4));
     let pixels = squares.flat_map(|[x, y]| (0..16).map(move |i| [x + i % 4, y + i / 4]));
     pixels.filter(move |[x, y]| *x < width && *y < height)
 }

@@ -6,7 +6,7 @@
 //! belong to none.
 //!
 //! Components follow from the positions once; when a skin moves the vertices [`Topology::update`] evaluates
-//! volumes and boxes anew. Cost: about 0.3 s for a million triangles, an update some 10 ms. Memory: 8 bytes a
+//! volumes and boxes anew. Cost: about 0.3 s for a million triangles, an update some 10 ms. Memory: 20 bytes a
 //! triangle kept, some 60 while analysing. Limit: 2^31 triangles and vertices.
 
 use glam::{DVec3, Vec3};
@@ -29,7 +29,12 @@ pub struct Topology {
     order: Vec<u32>,
     /// Where each component starts in `order`, and its end.
     starts: Vec<usize>,
+    /// Of each triangle those across its edges, see [`Topology::neighbours`].
+    neighbours: Vec<[u32; 3]>,
 }
+
+/// The neighbour across an edge that has none, or more than one, or one that is turned the other way round.
+pub const NO_NEIGHBOUR: u32 = u32::MAX;
 
 /// One connected component.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,7 +76,7 @@ impl Topology {
     pub fn analyse(triangles: &Triangles) -> Self {
         let corners = welded_corners(triangles);
         let edges = Edges::of(&corners, triangles.x.len());
-        let (mut sets, open) = edges.join(corners.len());
+        let (mut sets, neighbours) = edges.join(&corners);
         let mut components: Vec<Component> = Vec::new();
         let mut component_of_root = vec![NO_COMPONENT; corners.len()];
         let component_of_triangle: Vec<u32> = (0..corners.len())
@@ -92,7 +97,7 @@ impl Topology {
                 }
                 let component = &mut components[*id as usize];
                 component.triangles += 1;
-                component.closed &= !open[i];
+                component.closed &= !neighbours[i].contains(&NO_NEIGHBOUR);
                 *id
             })
             .collect();
@@ -102,6 +107,7 @@ impl Topology {
             components,
             order,
             starts,
+            neighbours,
         };
         topology.update(triangles);
         topology
@@ -111,6 +117,12 @@ impl Topology {
     pub fn triangles_of(&self, component: u32) -> &[u32] {
         let c = component as usize;
         &self.order[self.starts[c]..self.starts[c + 1]]
+    }
+
+    /// The triangles across the edges of each triangle, first the one across from its first corner; [`NO_NEIGHBOUR`] unless
+    /// exactly two triangles have the edge, one in each direction.
+    pub fn neighbours(&self) -> &[[u32; 3]] {
+        &self.neighbours
     }
 
     /// Evaluates volumes and boxes for moved vertices of the same mesh.
@@ -320,23 +332,31 @@ impl Edges {
         Self { starts, halves }
     }
 
-    /// Joins triangles that share an edge; also tells which triangles have an edge that is not closed.
-    fn join(mut self, triangles: usize) -> (Sets, Vec<bool>) {
-        let mut sets = Sets::new(triangles);
-        let mut open = vec![false; triangles];
+    /// Joins triangles that share an edge; also tells the neighbours of each across its edges.
+    fn join(mut self, corners: &[[u32; 3]]) -> (Sets, Vec<[u32; 3]>) {
+        let mut sets = Sets::new(corners.len());
+        let mut neighbours = vec![[NO_NEIGHBOUR; 3]; corners.len()];
         for v in 0..self.starts.len() - 2 {
             let around = &mut self.halves[self.starts[v] as usize..self.starts[v + 1] as usize];
             around.sort_unstable_by_key(|h| (h.other, h.triangle_and_turn));
             for edge in around.chunk_by(|g, h| g.other == h.other) {
-                let turned = edge.iter().filter(|h| h.triangle_and_turn & 1 == 1).count();
-                let closed = edge.len() == 2 && turned == 1;
                 for half in edge {
-                    open[(half.triangle_and_turn >> 1) as usize] |= !closed;
                     sets.join(edge[0].triangle_and_turn >> 1, half.triangle_and_turn >> 1);
+                }
+                let turned = edge.iter().filter(|h| h.triangle_and_turn & 1 == 1).count();
+                if edge.len() != 2 || turned != 1 {
+                    continue;
+                }
+                for (own, other) in [(edge[0], edge[1]), (edge[1], edge[0])] {
+                    let triangle = own.triangle_and_turn as usize >> 1;
+                    // The edge is across from the corner that is not on it.
+                    let apart = |&c: &u32| c != v as u32 && c != own.other;
+                    let across = corners[triangle].iter().position(apart);
+                    neighbours[triangle][across.expect("corners differ")] = other.triangle_and_turn >> 1;
                 }
             }
         }
-        (sets, open)
+        (sets, neighbours)
     }
 }
 

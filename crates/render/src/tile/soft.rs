@@ -4,7 +4,7 @@
 //! and distance. HM08 measures visibility alone: there the light of the middle is multiplied with the share of samples
 //! seen.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use rayward_trace::{AreaLight, Light, Receiver, Samples, Tile, exact};
 
 use super::{TileShader, TileWork};
@@ -20,6 +20,27 @@ pub(crate) fn samples(options: &RenderOptions, light: usize, sample: u32) -> Sam
     Samples::new(options.samples, options.seed.wrapping_add(own))
 }
 
+/// Fills up with nobody where a pixel lies in another square of 4 x 4 or 8 x 8 than the one before: those that are tested
+/// or culled for together are to lie close together.
+fn fill_up(
+    square: &mut Option<[u32; 2]>,
+    pixel: [u32; 2],
+    receivers: &mut Vec<Receiver>,
+    pixels: &mut Vec<u32>,
+) {
+    let here = pixel.map(|v| v / 4);
+    if let Some(last) = square.replace(here).filter(|last| *last != here) {
+        let together = if last.map(|v| v / 2) == here.map(|v| v / 2) {
+            16
+        } else {
+            64
+        };
+        let size = receivers.len().next_multiple_of(together);
+        receivers.resize(size, Receiver::free(DVec3::NAN));
+        pixels.resize(size, 0);
+    }
+}
+
 impl TileShader<'_> {
     /// Adds the light of one source with a size to all points of the tile that it reaches.
     pub(super) fn illuminate_softly(&self, light: usize, area: &AreaLight, tile: &Tile, work: &mut TileWork) {
@@ -27,6 +48,7 @@ impl TileShader<'_> {
         work.receivers.clear();
         work.pixels.clear();
         work.asked.clear();
+        let mut square = None;
         for (i, point) in work.points.iter().enumerate() {
             let radiance = if self.options.paper {
                 direct(&point.surface, &self.lights[light]).map(|incident| incident.radiance)
@@ -37,6 +59,12 @@ impl TileShader<'_> {
                 && area.shines_at(point.receiver.point)
                 && self.may_face(area, &point.receiver)
             {
+                fill_up(
+                    &mut square,
+                    [point.x, point.y],
+                    &mut work.receivers,
+                    &mut work.pixels,
+                );
                 work.receivers.push(point.receiver);
                 work.pixels
                     .push((tile.y + point.y) * self.camera.width + tile.x + point.x);
@@ -61,12 +89,12 @@ impl TileShader<'_> {
             _ => return,
         }
         let share = 1.0 / samples.count() as f32;
-        for n in 0..work.asked.len() {
+        let somebody = (0..work.receivers.len()).filter(|&n| !work.receivers[n].point.is_nan());
+        for (n, &(i, radiance)) in somebody.zip(&work.asked) {
             let visible = &work.visible[n * samples.words()..(n + 1) * samples.words()];
             if visible.iter().all(|&word| word == 0) {
                 continue;
             }
-            let (i, radiance) = work.asked[n];
             let (receiver, pixel) = (work.receivers[n], work.pixels[n]);
             let surface = &work.points[i as usize].surface;
             let certain = area.side(triangles(self.geometry).corners(receiver.prim)) != 0.0;

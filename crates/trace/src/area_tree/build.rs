@@ -18,7 +18,7 @@ use crate::{AreaLight, Triangles};
 /// A triangle that takes part in a frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    bounds: [f32; 5],
+    bounds: [f32; 6],
     /// Twice or four times the triangle's id: bit 0 is set if it is turned with its back to the light, bit 1 if its plane
     /// crosses the light.
     tag: u32,
@@ -84,6 +84,16 @@ pub(super) fn entries(
         entries
     };
     (0..chunks).into_par_iter().flat_map_iter(chunk).collect()
+}
+
+/// A bit for each triangle that has an entry.
+pub(super) fn present(entries: &[Entry], triangles: usize) -> Vec<u64> {
+    let mut bits = vec![0; triangles.div_ceil(64)];
+    for entry in entries {
+        let prim = entry.tag >> 2;
+        bits[prim as usize / 64] |= 1 << (prim % 64);
+    }
+    bits
 }
 
 /// Sorts the entries by the keys, which have at most 30 bits; equal ones stay in order.
@@ -175,7 +185,7 @@ impl Ranges {
 
     /// Mapped middle and depth.
     fn place(&self, entry: &Entry) -> [f32; 3] {
-        let [x0, x1, y0, y1, nearest] = entry.bounds;
+        let [x0, x1, y0, y1, nearest, _] = entry.bounds;
         let [x, y] = self.mapped([(x0 + x1) * 0.5, (y0 + y1) * 0.5]);
         [x, y, if self.parallel { -nearest } else { 1.0 / nearest }]
     }
@@ -189,7 +199,7 @@ impl Ranges {
             // What is not a number becomes 0.
             (share as u32).min((1 << bits) - 1)
         };
-        let [x0, x1, y0, y1, _] = entry.bounds;
+        let [x0, x1, y0, y1, ..] = entry.bounds;
         let (low, high) = (self.mapped([x0, y0]), self.mapped([x1, y1]));
         let extent = |axis: usize| (high[axis] - low[axis]) / (self.high[axis] - self.low[axis]);
         let extent = extent(0).max(extent(1));
@@ -258,12 +268,13 @@ pub(super) fn groups(
     groups.par_iter_mut().zip(sorted.par_chunks(LANES)).for_each_init(
         CornerLanes::default,
         |corners, (group, chunk)| {
-            group.crossing = 0;
+            (group.crossing, group.back) = (0, 0);
             for (lane, &i) in chunk.iter().enumerate() {
                 let tag = entries[i as usize].tag;
                 let prim = tag >> 2;
                 group.prim[lane] = prim;
                 group.crossing |= u32::from(tag & CROSSING != 0) << lane;
+                group.back |= (tag & BACK) << lane;
                 corners.side[lane] = if tag & BACK != 0 { -1.0 } else { 1.0 };
                 for (corner, at) in triangles.corners(prim).into_iter().enumerate() {
                     for axis in 0..3 {

@@ -201,7 +201,7 @@ impl Frame {
         }
     }
 
-    /// The box of a triangle: smallest and largest x and y, largest nearness. `None` if it cannot come between a
+    /// The box of a triangle: smallest and largest x and y, largest and smallest nearness. `None` if it cannot come between a
     /// receiver of this frame and the light.
     #[inline]
     pub(super) fn bounds(
@@ -209,7 +209,7 @@ impl Frame {
         triangles: &Triangles,
         vertices: &[RasterVertex],
         prim: u32,
-    ) -> Option<[f32; 5]> {
+    ) -> Option<[f32; 6]> {
         let [a, b, c] = triangles.indices[prim as usize].map(|i| &vertices[i as usize]);
         let behind = a.nearness < 0.0 && b.nearness < 0.0 && c.nearness < 0.0;
         if behind {
@@ -222,9 +222,11 @@ impl Frame {
                 a.y.min(b.y).min(c.y),
                 a.y.max(b.y).max(c.y),
                 a.nearness.max(b.nearness).max(c.nearness),
+                a.nearness.min(b.nearness).min(c.nearness),
             ]
         } else {
-            self.unbounded(triangles.corners(prim))
+            let [x0, x1, y0, y1, nearest] = self.unbounded(triangles.corners(prim));
+            [x0, x1, y0, y1, nearest, -FAR]
         };
         if let Some(reach) = self.reach
             && Self::is_beside(reach as f32, &bounds, [a, b, c])
@@ -236,17 +238,19 @@ impl Frame {
             (v + side * (v.abs() * 2.0 * f32::EPSILON + 1e-37)).clamp(-FAR, FAR)
         };
         let nearest = (f64::from(bounds[4]) * self.scale[1]) as f32 * (1.0 + 4.0 * f32::EPSILON);
+        let farthest = (f64::from(bounds[5]) * self.scale[1]) as f32;
         Some([
             wider(bounds[0], -1.0),
             wider(bounds[1], 1.0),
             wider(bounds[2], -1.0),
             wider(bounds[3], 1.0),
             nearest.min(FAR),
+            (farthest - farthest.abs() * (4.0 * f32::EPSILON)).max(-FAR),
         ])
     }
 
     /// Whether a triangle is on the outer side of one of the planes of a cube's face, moved out by `reach`.
-    fn is_beside(reach: f32, bounds: &[f32; 5], vertices: [&RasterVertex; 3]) -> bool {
+    fn is_beside(reach: f32, bounds: &[f32; 6], vertices: [&RasterVertex; 3]) -> bool {
         // |x| > depth + reach at all corners, which all lie ahead.
         let nearness = vertices.map(|v| v.nearness);
         if !nearness.iter().all(|&n| n > 0.0) {
@@ -254,7 +258,7 @@ impl Frame {
         }
         let beyond =
             |at: fn(&RasterVertex) -> f32| vertices.iter().all(|v| at(v) > 1.0 + reach * v.nearness + 1e-5);
-        let [x0, x1, y0, y1, _] = *bounds;
+        let [x0, x1, y0, y1, ..] = *bounds;
         (x0 > 1.0 && beyond(|v| v.x))
             || (x1 < -1.0 && beyond(|v| -v.x))
             || (y0 > 1.0 && beyond(|v| v.y))

@@ -2,17 +2,18 @@
 //!
 //! HM08 asks for soft shadows with a 3-D perspective grid and packets of four rays that leave one receiver. Here the
 //! perspective space has a hierarchy, since triangles near a light and large ones reach over many cells, and what is
-//! asked is a batch: sixteen neighbouring receivers with all their samples. A search finds the triangles whose boxes
-//! may come between the batch and the light, where rays drift sideways the less the nearer a triangle is to the
-//! receivers; mostly there are none, and the batch is lit without a sample having been made. The rest is culled
-//! against the batch's shaft and tested, one triangle against sixteen receivers and all samples
-//! ([`crate::kernel::lines`]). Samples that are decided are not tested again, and a batch of which nothing is seen any
-//! more is done.
+//! asked is a block: 256 neighbouring receivers with all their samples. A search finds the triangles whose boxes
+//! may come between the block and the light, where rays drift sideways the less the nearer a triangle is to the
+//! receivers; where there are none, receivers are lit without a sample having been made. The rest is culled
+//! against the shaft of each 64 receivers, which may show that they are dark as a whole ([`crate::kernel::cover`]), and
+//! tested for each sixteen: a triangle against one sample of each, of those samples whose bundle of rays meets its box
+//! ([`crate::kernel::bundles`], [`crate::kernel::lines`]). Samples that are decided are not tested again, and a batch of which
+//! nothing is seen any more is done.
 //!
 //! Answers: exactly those of [`crate::BruteForce::visible_samples`], bit for bit. Kernels filter with error bounds;
 //! pairs within them are decided by [`crate::exact`].
 //!
-//! Layout: 1.5 KB for sixteen triangles and 0.34 KB for their boxes, some 115 bytes a triangle; 40 more a triangle while
+//! Layout: 1.5 KB for sixteen triangles and 0.4 KB for their boxes, some 120 bytes a triangle; 44 more a triangle while
 //! building. Spheres have six trees, with one sixth of the triangles each and those that reach over. Rebuilt every
 //! frame. Limits: where coordinates pass 1e30, or there are more than 2^30 triangles, each is tested exactly.
 
@@ -22,11 +23,12 @@ mod frame;
 use glam::DVec3;
 
 use crate::kernel::area::{BATCHES, BlockWork, LightLanes, TreeLanes, query};
+use crate::kernel::cover::Surfaces;
 use crate::kernel::lines::{Answers, Group};
 use crate::kernel::shaft::Boxes;
 use crate::kernel::{LANES, SimdLevel};
 use crate::light_grid::CastRule;
-use crate::{AreaLight, Light, Receiver, Samples, Triangles, exact};
+use crate::{AreaLight, Light, Receiver, Samples, Topology, Triangles, exact};
 use build::{MOST_TRIANGLES, Order, Ranges};
 use frame::{Frame, Local};
 
@@ -45,6 +47,7 @@ pub struct AreaLightTree<'a> {
     light: AreaLight,
     triangles: Triangles<'a>,
     level: SimdLevel,
+    neighbours: &'a [[u32; 3]],
     local: Option<Local>,
     faces: Vec<Face>,
     /// Casters to be tested one by one, where there is no tree.
@@ -57,6 +60,8 @@ struct Face {
     levels: Vec<Vec<Boxes>>,
     groups: Vec<Group>,
     references: usize,
+    /// A bit for each triangle that takes part.
+    present: Vec<u64>,
 }
 
 /// What became of the samples asked about.
@@ -68,9 +73,11 @@ pub struct AreaCounts {
     pub samples: u64,
     /// Those found lit without a test, or dark because the light shines elsewhere.
     pub untested: u64,
-    /// Nodes searched, for 64 receivers each.
+    /// Receivers that were found dark as a whole, by one triangle or a sheet that hides all of the light.
+    pub covered: u64,
+    /// Nodes searched, for up to 256 receivers each.
     pub nodes: u64,
-    /// Triangles that came into question, for sixteen receivers each.
+    /// Triangles tested against a sample of each of sixteen receivers.
     pub tests: u64,
     /// Samples of receivers and triangles decided exactly.
     pub exact_pairs: u64,
@@ -91,6 +98,7 @@ impl<'a> AreaLightTree<'a> {
             light,
             triangles,
             level,
+            neighbours: &[],
             local: None,
             faces: Vec::new(),
             unsorted: Vec::new(),
@@ -113,6 +121,17 @@ impl<'a> AreaLightTree<'a> {
             .map(|frame| Face::build(frame, &local, &light, &triangles, rule, level))
             .collect();
         tree
+    }
+
+    /// Tells the tree which triangles hang together, so that many small ones can hide the light as one large one does.
+    /// It changes no answer.
+    ///
+    /// # Panics
+    /// If the topology is not that of as many triangles.
+    pub fn with_topology(mut self, topology: &'a Topology) -> Self {
+        self.neighbours = topology.neighbours();
+        assert_eq!(self.neighbours.len(), self.triangles.len(), "of these triangles");
+        self
     }
 
     /// The light.
@@ -141,8 +160,9 @@ impl<'a> AreaLightTree<'a> {
     }
 
     /// For each receiver, which samples of the light it sees: [`Samples::words`] words each, one bit a sample.
-    /// `pixels` has the pixel of each receiver. Neighbours in the list should be neighbours in space: each 64 are
-    /// searched for together, and each sixteen tested.
+    /// `pixels` has the pixel of each receiver. Neighbours in the list should be neighbours in space: each 256 are
+    /// searched for together, each 64 culled for, and each sixteen tested; points that are not finite fill
+    /// up and count nowhere.
     ///
     /// # Panics
     /// If there are not as many pixels as receivers.
@@ -157,8 +177,9 @@ impl<'a> AreaLightTree<'a> {
         assert_eq!(receivers.len(), pixels.len(), "a pixel for each receiver");
         bits.clear();
         bits.resize(receivers.len() * samples.words(), 0);
-        scratch.counts.receivers += receivers.len() as u64;
-        scratch.counts.samples += receivers.len() as u64 * u64::from(samples.count());
+        let asking = receivers.iter().filter(|r| r.point.is_finite()).count() as u64;
+        scratch.counts.receivers += asking;
+        scratch.counts.samples += asking * u64::from(samples.count());
         let blocks = receivers.chunks(BLOCK).zip(pixels.chunks(BLOCK));
         for ((receivers, pixels), bits) in blocks.zip(bits.chunks_mut(BLOCK * samples.words())) {
             self.block(receivers, pixels, samples, scratch, bits);
@@ -203,8 +224,9 @@ impl<'a> AreaLightTree<'a> {
                 self.test_all(receivers, pixels, samples, far[batch], &mut answers.open);
             }
             let tested = far[batch] | if asked & (1 << batch) == 0 { 0 } else { near[batch] };
-            let untested = receivers.len() as u32 - tested.count_ones();
-            scratch.counts.untested += u64::from(untested) * u64::from(samples.count());
+            let asking = receivers.iter().filter(|r| r.point.is_finite()).count() as u64;
+            let untested = asking - u64::from(tested.count_ones());
+            scratch.counts.untested += untested * u64::from(samples.count());
             let words = samples.words();
             let bits = &mut bits[batch * LANES * words..];
             for (k, &open) in answers.open.iter().enumerate() {
@@ -217,6 +239,7 @@ impl<'a> AreaLightTree<'a> {
         }
         scratch.counts.nodes += std::mem::take(&mut work.nodes);
         scratch.counts.tests += std::mem::take(&mut work.tests);
+        scratch.counts.covered += std::mem::take(&mut work.covered);
     }
 
     /// Has the kernels close what they can of the receivers `near`; returns a bit for each batch in which there was
@@ -248,7 +271,13 @@ impl<'a> AreaLightTree<'a> {
                 }
             }
             if lanes != [0; BATCHES] && !face.groups.is_empty() {
-                asked |= query(self.level, &face.lanes(), &light, lanes, work);
+                asked |= query(
+                    self.level,
+                    &face.lanes(&self.triangles, self.neighbours),
+                    &light,
+                    lanes,
+                    work,
+                );
             }
         }
         asked
@@ -275,19 +304,17 @@ impl<'a> AreaLightTree<'a> {
     ) -> u64 {
         let mut decided = 0;
         for unsure in &answers.unsure {
-            let open = &mut answers.open[unsure.sample as usize];
-            let mut lanes = unsure.lanes & *open;
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                decided += 1;
-                let receiver = &receivers[lane];
-                let end = self
-                    .light
-                    .sample(samples, pixels[lane], receiver.point, unsure.sample);
-                if exact::shadows(&self.triangles, unsure.prim, receiver, &end) {
-                    *open &= !(1 << lane);
-                }
+            let (open, lane) = (&mut answers.open[unsure.sample as usize], unsure.lane as usize);
+            if *open & 1 << lane == 0 {
+                continue;
+            }
+            decided += 1;
+            let receiver = &receivers[lane];
+            let end = self
+                .light
+                .sample(samples, pixels[lane], receiver.point, unsure.sample);
+            if exact::shadows(&self.triangles, unsure.prim, receiver, &end) {
+                *open &= !(1 << lane);
             }
         }
         decided
@@ -362,7 +389,9 @@ impl Face {
         let sorted = build::sort(&entries, |entry| ranges.key(entry, order));
         let levels = build::levels(&entries, &sorted);
         let groups = build::groups(&entries, &sorted, triangles, local, level);
+        let present = build::present(&entries, triangles.len());
         Self {
+            present,
             frame,
             levels,
             groups,
@@ -378,8 +407,14 @@ impl Face {
             .take(self.references)
     }
 
-    fn lanes(&self) -> TreeLanes<'_> {
+    fn lanes<'t>(&'t self, triangles: &'t Triangles<'t>, neighbours: &'t [[u32; 3]]) -> TreeLanes<'t> {
         TreeLanes {
+            surfaces: Surfaces {
+                triangles,
+                neighbours,
+                groups: &self.groups,
+                present: &self.present,
+            },
             frame: &self.frame.lanes,
             levels: &self.levels,
             groups: &self.groups,

@@ -35,8 +35,9 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: AreaLight, coun
         .map(|(r, &pixel)| brute.visible_samples(r, &light, &samples, pixel))
         .collect();
     let mut counts = AreaCounts::default();
+    let topology = Topology::analyse(&triangles);
     for level in SimdLevel::available() {
-        let tree = AreaLightTree::build(light, triangles, &|_| Casts::Both, level);
+        let tree = AreaLightTree::build(light, triangles, &|_| Casts::Both, level).with_topology(&topology);
         let (mut scratch, mut bits) = (AreaScratch::default(), Vec::new());
         tree.visible(receivers, &pixels, &samples, &mut scratch, &mut bits);
         for (i, (got, want)) in bits.chunks(samples.words()).zip(&expected).enumerate() {
@@ -276,4 +277,101 @@ fn casters_that_face_the_light_may_be_left_out_of_closed_meshes() {
     assert_eq!(both.0, back.0);
     assert!(back.1 < both.1 * 3 / 4 && both.0.contains(&255) && both.0.iter().any(|&b| b != 255));
     assert_eq!(visible(Casts::Nothing), (vec![255; receivers.len()], 0));
+}
+
+/// Receivers of which each sixteen, 64 and 256 lie close together, under the middle of a sheet; a sheet of triangles smaller
+/// than what they span, and a light above.
+fn under_a_sheet() -> (Mesh, Vec<Receiver>, AreaLight) {
+    let (mut mesh, mut numbers) = (Mesh::default(), Numbers(3));
+    let at = |i: i32, j: i32| {
+        let height = 0.1 * ((i * 7 + j * 3) % 5) as f32 * 0.1;
+        Vec3::new(i as f32 * 0.04, 0.5 + height, j as f32 * 0.04)
+    };
+    for (i, j) in (-15..15).flat_map(|i| (-15..15).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        mesh.triangle([a, b, c]);
+        mesh.triangle([a, c, d]);
+    }
+    let mut place = |_| {
+        let p = numbers.point() * 0.1 + Vec3::new(0.01, -0.5, 0.02);
+        Receiver::free(p.as_dvec3())
+    };
+    let receivers = (0..512).map(&mut place).collect();
+    let light = AreaLight::rectangle(Vec3::Y * 1.5, Vec3::X * 0.1, Vec3::Z * 0.1);
+    (mesh, receivers, light)
+}
+
+#[test]
+fn small_triangles_that_hang_together_hide_the_light_from_all() {
+    let (mesh, receivers, light) = under_a_sheet();
+    let counts = check("sheet", &mesh, &receivers, light, 8);
+    assert_eq!((counts.covered, counts.tests), (512, 0), "{counts:?}");
+}
+
+#[test]
+fn light_comes_through_gaps_between_them() {
+    // A triangle that is missing, one that is turned round, one moved away after the topology was found, and a second
+    // one in the same place: each breaks the sheet or does not, and answers are right.
+    let (whole, receivers, light) = under_a_sheet();
+    let middle = 15 * 30 + 15;
+    let samples = Samples::new(8, 7);
+    let pixels: Vec<u32> = (0..512).collect();
+    for change in 0..4 {
+        let (mut mesh, ..) = under_a_sheet();
+        let triangle = 2 * middle;
+        let corners = mesh.indices[triangle];
+        let mut topology = Topology::analyse(&whole.triangles());
+        match change {
+            0 => {
+                mesh.indices.remove(triangle);
+                topology = Topology::analyse(&mesh.triangles());
+            }
+            1 => {
+                mesh.indices[triangle].swap(0, 1);
+                topology = Topology::analyse(&mesh.triangles());
+            }
+            2 => corners.iter().for_each(|&i| mesh.x[i as usize] += 0.03),
+            _ => {
+                mesh.indices.push(corners);
+                topology = Topology::analyse(&mesh.triangles());
+            }
+        }
+        let triangles = mesh.triangles();
+        let brute = BruteForce::new(triangles);
+        let expected: Vec<u32> = receivers
+            .iter()
+            .zip(&pixels)
+            .flat_map(|(r, &pixel)| brute.visible_samples(r, &light, &samples, pixel))
+            .collect();
+        let seen: u32 = expected.iter().map(|bits| bits.count_ones()).sum();
+        assert_eq!(seen > 0, change == 0 || change == 2, "change {change}: {seen}");
+        for level in SimdLevel::available() {
+            let tree =
+                AreaLightTree::build(light, triangles, &|_| Casts::Both, level).with_topology(&topology);
+            let mut bits = Vec::new();
+            let mut scratch = AreaScratch::default();
+            tree.visible(&receivers, &pixels, &samples, &mut scratch, &mut bits);
+            assert!(bits == expected, "change {change}, {}", level.name());
+        }
+    }
+}
+
+#[test]
+fn a_triangle_that_does_not_cast_is_a_gap() {
+    let (mesh, receivers, light) = under_a_sheet();
+    let (samples, pixels) = (Samples::new(8, 7), vec![3; 512]);
+    let topology = Topology::analyse(&mesh.triangles());
+    let missing = 2 * (15 * 30 + 15);
+    let rule = |prim: u32| {
+        if prim == missing {
+            Casts::Nothing
+        } else {
+            Casts::Both
+        }
+    };
+    let tree = AreaLightTree::build(light, mesh.triangles(), &rule, SimdLevel::detect());
+    let tree = tree.with_topology(&topology);
+    let (mut scratch, mut bits) = (AreaScratch::default(), Vec::new());
+    tree.visible(&receivers, &pixels, &samples, &mut scratch, &mut bits);
+    assert!(scratch.counts.covered == 0 && bits.iter().any(|&b| b != 0));
 }

@@ -20,8 +20,19 @@ pub(crate) struct Askers {
     pub(crate) offset: [[f32; LANES]; 3],
 }
 
-/// Offsets of the samples from the light's middle: for each, x, y and z of sixteen receivers. `unit` is a factor they
-/// are scaled by, a power of two.
+/// Samples of sixteen receivers by their place on the light: slot by slot the samples, at most one of each receiver, that
+/// lie in the same box of the unit square. The first points of a (0, 2)-sequence lie in boxes of their own.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SamplePoints {
+    /// Offsets from the light's middle: for each slot, x, y and z of sixteen receivers.
+    pub(crate) offsets: Vec<[[f32; LANES]; 3]>,
+    /// For each slot, the receivers that have a sample in it.
+    pub(crate) lanes: Vec<u32>,
+    /// For each slot, the sample of each of them.
+    pub(crate) sample: Vec<[u8; LANES]>,
+}
+
+/// Finds the samples. `unit` is a factor that offsets are scaled by, a power of two.
 #[inline(always)]
 pub(crate) fn light_points<S: Simd>(
     simd: S,
@@ -29,9 +40,14 @@ pub(crate) fn light_points<S: Simd>(
     samples: &Samples,
     askers: &Askers,
     unit: f32,
-    out: &mut Vec<[[f32; LANES]; 3]>,
+    out: &mut SamplePoints,
 ) {
-    out.resize(samples.count() as usize, [[0.0; LANES]; 3]);
+    let bits = samples.count().next_power_of_two().trailing_zeros();
+    let (column_bits, row_bits) = (bits.div_ceil(2), bits / 2);
+    out.offsets.resize(1 << bits, [[0.0; LANES]; 3]);
+    out.lanes.clear();
+    out.lanes.resize(1 << bits, 0);
+    out.sample.resize(1 << bits, [0; LANES]);
     let splat = |v: f32| f32x16::splat(simd, v);
     let lanes = |v: glam::Vec3| [splat(v.x), splat(v.y), splat(v.z)];
     let (axes, center) = ([lanes(light.half_u), lanes(light.half_v)], lanes(light.center));
@@ -43,12 +59,15 @@ pub(crate) fn light_points<S: Simd>(
     let seed = u32x16::splat(simd, samples.seed());
     let base = hash(simd, u32x16::from_slice(simd, &askers.pixel) ^ seed);
     let seeds = [base, hash(simd, base + u32x16::splat(simd, DIMENSION))];
-    for (k, point) in (0..).zip(out) {
-        let coordinate = |k: u32, seed| {
-            let bits = scrambled(simd, u32x16::splat(simd, k), seed);
-            unit_float(simd, bits) * splat(2.0) - splat(1.0)
-        };
-        let (x, y) = (coordinate(k, seeds[0]), coordinate(second(k), seeds[1]));
+    let two_to = |bits: u32| splat((1u32 << bits) as f32);
+    let mut offsets = [[0.0; LANES]; 3];
+    for k in 0..samples.count() {
+        let x = unit_float(simd, scrambled(simd, u32x16::splat(simd, k), seeds[0]));
+        let y = unit_float(simd, scrambled(simd, u32x16::splat(simd, second(k)), seeds[1]));
+        let column: u32x16<S> = (x * two_to(column_bits)).to_int();
+        let row: u32x16<S> = (y * two_to(row_bits)).to_int();
+        let slots: [u32; LANES] = (row * u32x16::splat(simd, 1 << column_bits) + column).into();
+        let (x, y) = (x * splat(2.0) - splat(1.0), y * splat(2.0) - splat(1.0));
         let [x, y] = match light.shape {
             Shape::Rectangle => [x, y],
             _ => disk(simd, x, y),
@@ -61,7 +80,13 @@ pub(crate) fn light_points<S: Simd>(
             };
             // The sample is the rounded point, which the offset is then taken from.
             let rounded = center[axis] + offset;
-            ((rounded - center[axis]) * splat(unit)).store_slice(&mut point[axis]);
+            ((rounded - center[axis]) * splat(unit)).store_slice(&mut offsets[axis]);
+        }
+        for (lane, slot) in slots.into_iter().enumerate() {
+            let slot = slot as usize;
+            (0..3).for_each(|axis| out.offsets[slot][axis][lane] = offsets[axis][lane]);
+            out.lanes[slot] |= 1 << lane;
+            out.sample[slot][lane] = k as u8;
         }
     }
 }
@@ -180,11 +205,17 @@ mod tests {
         let samples = Samples::new(37, 11);
         for light in lights {
             for level in SimdLevel::available() {
-                let mut out = Vec::new();
+                let mut out = SamplePoints::default();
                 dispatch!(level.0, simd => light_points(simd, &light, &samples, &askers, 1.0, &mut out));
-                for (k, offsets) in out.iter().enumerate() {
-                    for (lane, point) in points.iter().enumerate() {
-                        let end = light.sample(&samples, askers.pixel[lane], *point, k as u32);
+                for (lane, point) in points.iter().enumerate() {
+                    let mut seen = [false; 37];
+                    for (slot, offsets) in out.offsets.iter().enumerate() {
+                        if out.lanes[slot] & 1 << lane == 0 {
+                            continue;
+                        }
+                        let k = out.sample[slot][lane];
+                        assert!(!std::mem::replace(&mut seen[usize::from(k)], true));
+                        let end = light.sample(&samples, askers.pixel[lane], *point, u32::from(k));
                         let (Light::Point(end) | Light::Directional(end)) = end;
                         let want = (end - light.center).to_array();
                         let got = [0, 1, 2].map(|axis| offsets[axis][lane]);
@@ -195,8 +226,8 @@ mod tests {
                             level.name()
                         );
                     }
+                    assert_eq!(seen, [true; 37]);
                 }
-                assert_eq!(out.len(), 37);
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Lines from receivers to the samples of an area light against triangles: one triangle, sixteen receivers, all
-//! samples.
+//! Lines from receivers to the samples of an area light against triangles: one triangle, sixteen receivers, one sample
+//! of each.
 //!
 //! With everything relative to the light's middle, let a triangle's edge have the direction E and the moment
 //! M = v x E. The line from receiver p to the sample at d passes the edge on the side of
@@ -19,9 +19,9 @@
 //! 1 / (|E| (|v| + 3 a)), so the bound is a number of the receiver's: [`ReceiverLanes::edge_error`]. Planes likewise.
 //! Beyond the bound the sign is certain, within it the pair is decided exactly by the caller.
 //!
-//! Cost: some 60 operations a triangle and 13 a sample, for sixteen receivers.
+//! Cost: some 40 operations a triangle and 15 a sample, for sixteen receivers.
 
-use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
 use super::{LANES, ROUNDOFF};
 
@@ -66,6 +66,8 @@ pub(crate) struct Group {
     pub(crate) prim: [u32; LANES],
     /// A bit for each whose plane is to be tested for every sample.
     pub(crate) crossing: u32,
+    /// A bit for each that turns its back to the light.
+    pub(crate) back: u32,
 }
 
 /// The light as the kernels see it.
@@ -146,11 +148,11 @@ pub(crate) struct CornerLanes {
     pub(crate) side: [f32; LANES],
 }
 
-/// Pairs that f32 cannot tell: a sample, lanes of receivers, a triangle.
+/// A pair that f32 cannot tell: a sample of a receiver, and a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unsure {
     pub(crate) sample: u32,
-    pub(crate) lanes: u32,
+    pub(crate) lane: u32,
     pub(crate) prim: u32,
 }
 
@@ -220,20 +222,23 @@ pub(crate) struct Answers {
 }
 
 /// The sides of a triangle's edges on which the lines from sixteen receivers pass, as functions of the sample.
-struct EdgeSides<S: Simd> {
+pub(crate) struct EdgeSides<S: Simd> {
     constant: [f32x16<S>; 3],
     gradient: [[f32x16<S>; 3]; 3],
-    /// Bounds on the smallest of the three over all of the light's box.
-    most: f32x16<S>,
-    least: f32x16<S>,
 }
 
 impl<S: Simd> EdgeSides<S> {
     #[inline(always)]
-    fn new(simd: S, p: [f32x16<S>; 3], group: &Group, lane: usize, light: &LightBox) -> Self {
+    pub(crate) fn new(
+        simd: S,
+        receivers: &ReceiverLanes,
+        group: &Group,
+        lane: usize,
+        light: &LightBox,
+    ) -> Self {
         let splat = |v: f32| f32x16::splat(simd, v);
+        let p = load3(simd, &receivers.p);
         let (mut constant, mut gradient) = ([splat(0.0); 3], [[splat(0.0); 3]; 3]);
-        let (mut most, mut least) = (splat(f32::INFINITY), splat(f32::INFINITY));
         for i in 0..3 {
             let m = each3(|axis| group.m[i][axis][lane]);
             let e = each3(|axis| group.e[i][axis][lane]);
@@ -245,16 +250,8 @@ impl<S: Simd> EdgeSides<S> {
             } else {
                 -dot(simd, p, m)
             };
-            let spread = dot(simd, abs3(gradient[i]), light.half);
-            most = most.min(constant[i] + spread);
-            least = least.min(constant[i] - spread);
         }
-        Self {
-            constant,
-            gradient,
-            most,
-            least,
-        }
+        Self { constant, gradient }
     }
 
     /// The smallest of the three, for samples relative to the light's middle.
@@ -269,137 +266,77 @@ impl<S: Simd> EdgeSides<S> {
 }
 
 /// A triangle that may come between some receivers and the light.
-pub(crate) struct Candidate<S: Simd> {
-    sides: EdgeSides<S>,
-    surely_behind: mask32x16<S>,
+pub(crate) struct Candidate {
     /// The receivers in question.
-    lanes: u32,
-    /// Of them, those from which it certainly hides the whole light.
-    covered: u32,
+    pub(crate) lanes: u32,
+    pub(crate) prim: u32,
+    /// Those that are certainly behind it.
+    surely_behind: u32,
     normal: [f32; 3],
     /// Its plane at the light's middle.
     above: f32,
     crossing: bool,
-    prim: u32,
 }
 
-/// What a triangle of a group means for the receivers `active`; `None` if it hides no sample of any.
-#[inline(always)]
-pub(crate) fn candidate<S: Simd>(
-    simd: S,
-    receivers: &ReceiverLanes,
-    group: &Group,
-    lane: usize,
-    light: &LightBox,
-    active: u32,
-) -> Option<Candidate<S>> {
-    let p = load3(simd, &receivers.p);
-    let normal = each3(|axis| group.normal[axis][lane]);
-    let (height, prim) = (group.height[lane], group.prim[lane]);
-    let plane = dot(simd, p, normal) - f32x16::splat(simd, height);
-    let plane_error = f32x16::from_slice(simd, &receivers.plane_error);
-    let own = u32x16::from_slice(simd, &receivers.own).simd_eq(u32x16::splat(simd, prim));
-    let behind = plane.simd_le(plane_error);
-    let lanes = behind.to_bitmask() as u32 & !(own.to_bitmask() as u32) & active;
-    if lanes == 0 {
-        return None;
-    }
-    let error = f32x16::from_slice(simd, &receivers.edge_error);
-    let sides = EdgeSides::new(simd, p, group, lane, light);
-    let lanes = sides.most.simd_ge(-error).to_bitmask() as u32 & lanes;
-    if lanes == 0 {
-        return None;
-    }
-    let crossing = group.crossing & (1 << lane) != 0;
-    let surely_behind = (plane + plane_error).simd_lt(f32x16::splat(simd, 0.0));
-    let covered = sides.least.simd_gt(error) & surely_behind;
-    Some(Candidate {
-        covered: if crossing {
-            0
-        } else {
-            covered.to_bitmask() as u32 & lanes
-        },
-        sides,
-        surely_behind,
-        lanes,
-        normal,
-        above: dot_scalar(normal, light.middle) - height * light.weight,
-        crossing,
-        prim,
-    })
-}
-
-impl<S: Simd> Candidate<S> {
-    /// Whether there is anything to ask about single samples.
+impl Candidate {
+    /// What a triangle of a group means for the receivers `active`; `None` if it lies before none of them.
     #[inline(always)]
-    pub(crate) fn needs_samples(&self) -> bool {
-        self.lanes != self.covered
+    pub(crate) fn new<S: Simd>(
+        simd: S,
+        receivers: &ReceiverLanes,
+        group: &Group,
+        lane: usize,
+        light: &LightBox,
+        active: u32,
+    ) -> Option<Self> {
+        let p = load3(simd, &receivers.p);
+        let normal = each3(|axis| group.normal[axis][lane]);
+        let (height, prim) = (group.height[lane], group.prim[lane]);
+        let plane = dot(simd, p, normal) - f32x16::splat(simd, height);
+        let plane_error = f32x16::from_slice(simd, &receivers.plane_error);
+        let own = u32x16::from_slice(simd, &receivers.own).simd_eq(u32x16::splat(simd, prim));
+        let behind = plane.simd_le(plane_error);
+        let lanes = behind.to_bitmask() as u32 & !(own.to_bitmask() as u32) & active;
+        if lanes == 0 {
+            return None;
+        }
+        let surely_behind = (plane + plane_error).simd_lt(f32x16::splat(simd, 0.0));
+        Some(Self {
+            lanes,
+            prim,
+            surely_behind: surely_behind.to_bitmask() as u32,
+            above: normal[0] * light.middle[0] + normal[1] * light.middle[1] + normal[2] * light.middle[2]
+                - height * light.weight,
+            normal,
+            crossing: group.crossing & (1 << lane) != 0,
+        })
     }
 
-    /// Closes the samples that the triangle certainly hides, and notes unsure ones. Returns the receivers of the batch
-    /// that still see a sample.
+    /// From which receivers the triangle certainly hides the samples `d`, and from which it perhaps does.
     #[inline(always)]
-    pub(crate) fn test(
+    pub(crate) fn hides<S: Simd>(
         &self,
         simd: S,
         receivers: &ReceiverLanes,
         light: &LightBox,
-        samples: &[[[f32; LANES]; 3]],
-        answers: &mut Answers,
-    ) -> u32 {
+        sides: &EdgeSides<S>,
+        d: &[[f32; LANES]; 3],
+    ) -> [u32; 2] {
         let splat = |v: f32| f32x16::splat(simd, v);
         let error = f32x16::from_slice(simd, &receivers.edge_error);
-        let lanes = self.lanes & !self.covered;
-        let mut left = 0;
-        for (k, (open, samples)) in answers.open.iter_mut().zip(samples).enumerate() {
-            *open &= !self.covered;
-            let live = *open & lanes;
-            if live == 0 {
-                left |= *open;
-                continue;
-            }
-            let d = load3(simd, samples);
-            let inside = self.sides.at(d);
-            let mut possible = inside.simd_ge(-error);
-            let mut sure = inside.simd_gt(error) & self.surely_behind;
-            if self.crossing {
-                let before = dot(simd, d, self.normal) + splat(self.above);
-                possible &= before.simd_ge(splat(-light.plane_error));
-                sure &= before.simd_gt(splat(light.plane_error));
-            }
-            let sure = sure.to_bitmask() as u32 & live;
-            let rest = possible.to_bitmask() as u32 & live & !sure;
-            *open &= !sure;
-            left |= *open;
-            if rest != 0 {
-                answers.unsure.push(Unsure {
-                    sample: k as u32,
-                    lanes: rest,
-                    prim: self.prim,
-                });
-            }
+        let d = load3(simd, d);
+        let inside = sides.at(d);
+        let mut possible = inside.simd_ge(-error).to_bitmask() as u32 & self.lanes;
+        if possible == 0 {
+            return [0; 2];
         }
-        left
-    }
-}
-
-impl Group {
-    /// Copies a triangle of another group.
-    #[inline(always)]
-    pub(crate) fn copy(&mut self, to: usize, other: &Self, from: usize) {
-        for i in 0..3 {
-            for axis in 0..3 {
-                self.e[i][axis][to] = other.e[i][axis][from];
-                self.m[i][axis][to] = other.m[i][axis][from];
-            }
-            self.normal[i][to] = other.normal[i][from];
+        let mut sure = inside.simd_gt(error).to_bitmask() as u32 & self.surely_behind;
+        if self.crossing {
+            let before = dot(simd, d, self.normal) + splat(self.above);
+            possible &= before.simd_ge(splat(-light.plane_error)).to_bitmask() as u32;
+            sure &= before.simd_gt(splat(light.plane_error)).to_bitmask() as u32;
         }
-        self.height[to] = other.height[from];
-        self.prim[to] = other.prim[from];
-        self.crossing = self.crossing & !(1 << to) | (other.crossing >> from & 1) << to;
+        sure &= possible;
+        [sure, possible & !sure]
     }
-}
-
-fn dot_scalar(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -9,8 +9,10 @@
 
 pub(crate) mod area;
 pub(crate) mod batch;
+pub(crate) mod bundles;
 pub(crate) mod casters;
 pub(crate) mod cluster;
+pub(crate) mod cover;
 pub(crate) mod edges;
 pub(crate) mod lambert;
 pub(crate) mod light_points;

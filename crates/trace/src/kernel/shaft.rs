@@ -21,7 +21,7 @@ use fearless_simd::{Simd, f32x16, prelude::*};
 use super::LANES;
 use super::lines::{Group, LightBox, ReceiverLanes, abs3, dot, each3, load3};
 
-/// Sixteen boxes in a light's perspective space. 320 bytes.
+/// Sixteen boxes in a light's perspective space. 384 bytes.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Boxes {
@@ -29,6 +29,8 @@ pub(crate) struct Boxes {
     pub(crate) y: [[f32; LANES]; 2],
     /// Nearness of the nearest point.
     pub(crate) nearest: [f32; LANES],
+    /// Nearness of the farthest point.
+    farthest: [f32; LANES],
 }
 
 /// Larger than every coordinate that occurs, small enough to be multiplied.
@@ -41,13 +43,14 @@ impl Default for Boxes {
             x: [[FAR; LANES], [-FAR; LANES]],
             y: [[FAR; LANES], [-FAR; LANES]],
             nearest: [-FAR; LANES],
+            farthest: [FAR; LANES],
         }
     }
 }
 
 impl Boxes {
     /// The box around all of them that are not empty.
-    pub(crate) fn hull(&self) -> [f32; 5] {
+    pub(crate) fn hull(&self) -> [f32; 6] {
         let low = |v: &[f32; LANES]| v.iter().copied().fold(FAR, f32::min);
         let high = |v: &[f32; LANES]| v.iter().copied().fold(-FAR, f32::max);
         [
@@ -56,14 +59,31 @@ impl Boxes {
             low(&self.y[0]),
             high(&self.y[1]),
             high(&self.nearest),
+            low(&self.farthest),
         ]
     }
 
-    /// Sets one of them: smallest and largest x, y, and the nearness.
-    pub(crate) fn set(&mut self, lane: usize, [x0, x1, y0, y1, nearest]: [f32; 5]) {
+    /// Sets one of them: smallest and largest x, y, and the nearness of the nearest and the farthest point.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, lane: usize, [x0, x1, y0, y1, nearest, farthest]: [f32; 6]) {
         (self.x[0][lane], self.x[1][lane]) = (x0, x1);
         (self.y[0][lane], self.y[1][lane]) = (y0, y1);
         self.nearest[lane] = nearest;
+        self.farthest[lane] = farthest;
+    }
+
+    /// One of them, as [`Self::set`] takes it.
+    #[inline(always)]
+    pub(crate) fn get(&self, lane: usize) -> [f32; 6] {
+        let ([x0, x1], [y0, y1]) = (&self.x, &self.y);
+        [
+            x0[lane],
+            x1[lane],
+            y0[lane],
+            y1[lane],
+            self.nearest[lane],
+            self.farthest[lane],
+        ]
     }
 }
 
@@ -91,40 +111,138 @@ pub(crate) struct Bounds {
     pub(crate) depth: [f32; 2],
 }
 
-impl Bounds {
-    /// Bounds of the receivers whose bits are set in `active`.
+/// Each of sixteen receivers in a light's perspective space, like [`Bounds`].
+pub(crate) struct Places<S: Simd> {
+    pub(crate) x: [f32x16<S>; 2],
+    pub(crate) y: [f32x16<S>; 2],
+    pub(crate) depth: [f32x16<S>; 2],
+}
+
+impl<S: Simd> Places<S> {
     #[inline(always)]
-    pub(crate) fn of<S: Simd>(simd: S, frame: &FrameLanes, receivers: &ReceiverLanes, active: u32) -> Self {
+    pub(crate) fn of(simd: S, frame: &FrameLanes, receivers: &ReceiverLanes) -> Self {
         let splat = |v: f32| f32x16::splat(simd, v);
         let p = load3(simd, &receivers.p);
         let p = each3(|axis| p[axis] - splat(frame.center[axis]));
-        let plain = |a: [f32; 3]| p[0] * splat(a[0]) + p[1] * splat(a[1]) + p[2] * splat(a[2]);
-        let (along, above, depth) = (plain(frame.right), plain(frame.up), plain(frame.forward));
         let size = frame.center[0].abs() + frame.center[1].abs() + frame.center[2].abs();
         let error = (f32x16::from_slice(simd, &receivers.size) * splat(3.0) + splat(size))
             * splat(8.0 * f32::EPSILON);
+        let depth = plain(simd, p, frame.forward);
+        let depths = [depth - error, depth + error];
+        let (along, above) = (plain(simd, p, frame.right), -plain(simd, p, frame.up));
+        let (x, y) = if frame.reach.is_some() {
+            ([along - error, along + error], [above - error, above + error])
+        } else {
+            (
+                divided(simd, along, depth, error),
+                divided(simd, above, depth, error),
+            )
+        };
+        Self { x, y, depth: depths }
+    }
+
+    /// Bounds of those whose bits are set in `active`.
+    #[inline(always)]
+    pub(crate) fn bounds(&self, simd: S, active: u32) -> Bounds {
+        let splat = |v: f32| f32x16::splat(simd, v);
         let active = mask_of(simd, active);
         let least = |v: f32x16<S>| active.select(v, splat(FAR)).reduce_min();
         let most = |v: f32x16<S>| active.select(v, splat(-FAR)).reduce_max();
-        let (low, high) = (depth - error, depth + error);
-        let known = low.simd_gt(splat(0.0));
-        let range = |side: f32x16<S>| {
-            if frame.reach.is_some() {
-                return [least(side - error), most(side + error)];
-            }
-            let at = side / depth;
-            let slack =
-                error * (splat(1.0) + at.abs()) / low * splat(1.01) + at.abs() * splat(4.0 * f32::EPSILON);
-            let from = known.select(at - slack, splat(-FAR));
-            let to = known.select(at + slack, splat(FAR));
-            [least(from.max(splat(-FAR))), most(to.min(splat(FAR)))]
-        };
-        Self {
-            x: range(along),
-            y: range(-above),
-            depth: [least(low), most(high)],
+        Bounds {
+            x: [least(self.x[0]), most(self.x[1])],
+            y: [least(self.y[0]), most(self.y[1])],
+            depth: [least(self.depth[0]), most(self.depth[1])],
         }
     }
+}
+
+/// The scalar product with a vector that is the same for all lanes, not fused.
+#[inline(always)]
+pub(crate) fn plain<S: Simd>(simd: S, v: [f32x16<S>; 3], w: [f32; 3]) -> f32x16<S> {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    v[0] * splat(w[0]) + v[1] * splat(w[1]) + v[2] * splat(w[2])
+}
+
+/// Bounds of a raster coordinate.
+#[inline(always)]
+fn divided<S: Simd>(simd: S, side: f32x16<S>, depth: f32x16<S>, error: f32x16<S>) -> [f32x16<S>; 2] {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let low = depth - error;
+    let known = low.simd_gt(splat(0.0));
+    let at = side / depth;
+    let slack = error * (splat(1.0) + at.abs()) / low * splat(1.01) + at.abs() * splat(4.0 * f32::EPSILON);
+    [
+        known.select(at - slack, splat(-FAR)).max(splat(-FAR)),
+        known.select(at + slack, splat(FAR)).min(splat(FAR)),
+    ]
+}
+
+/// Where the rays of each of sixteen receivers may pass, like [`Search`].
+pub(crate) struct Reach<S: Simd> {
+    x: [f32x16<S>; 2],
+    y: [f32x16<S>; 2],
+    farthest: f32x16<S>,
+    drift: [f32x16<S>; 2],
+}
+
+impl<S: Simd> Reach<S> {
+    #[inline(always)]
+    pub(crate) fn new(simd: S, frame: &FrameLanes, places: &Places<S>) -> Self {
+        let splat = |v: f32| f32x16::splat(simd, v);
+        let (x, y, depth) = (places.x, places.y, places.depth);
+        if let Some(reach) = frame.reach {
+            return Self {
+                x,
+                y,
+                farthest: splat(reach - reach * 4.0 * f32::EPSILON) - depth[1],
+                drift: [splat(frame.half[0]), splat(frame.half[1])],
+            };
+        }
+        let beyond = depth[0].simd_gt(splat(frame.depth * 1.001)) & depth[0].simd_gt(splat(0.0));
+        let ratio = depth[0] / (depth[0] - splat(frame.depth)) * splat(1.0001);
+        let drift = |half: f32, range: [f32x16<S>; 2]| {
+            let slope = splat(frame.depth).mul_add(range[0].abs().max(range[1].abs()), splat(half));
+            beyond.select((slope * ratio).min(splat(FAR)), splat(FAR))
+        };
+        let ahead = depth[1].simd_gt(splat(0.0));
+        Self {
+            x,
+            y,
+            farthest: ahead.select(splat(1.0 - 2.0 * f32::EPSILON) / depth[1], splat(-FAR)),
+            drift: [drift(frame.half[0], x), drift(frame.half[1], y)],
+        }
+    }
+
+    /// A bit for each receiver whose rays may meet a box.
+    #[inline(always)]
+    pub(crate) fn meets(&self, simd: S, [x0, x1, y0, y1, nearest, _]: [f32; 6]) -> u32 {
+        let splat = |v: f32| f32x16::splat(simd, v);
+        let nearer = splat(nearest) - self.farthest;
+        // The slack covers the rounding of these few operations.
+        let wide = nearer * splat(1.00002);
+        let (dx, dy) = (wide * self.drift[0], wide * self.drift[1]);
+        let hit = nearer.simd_ge(splat(0.0))
+            & (self.x[1] + dx).simd_ge(splat(x0))
+            & (self.x[0] - dx).simd_le(splat(x1))
+            & (self.y[1] + dy).simd_ge(splat(y0))
+            & (self.y[0] - dy).simd_le(splat(y1));
+        hit.to_bitmask() as u32
+    }
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Bounds {
+    /// Bounds of nothing.
+    pub(crate) const NONE: Self = Self {
+        x: [FAR, -FAR],
+        y: [FAR, -FAR],
+        depth: [FAR, -FAR],
+    };
 
     /// The bounds of both.
     #[inline(always)]
@@ -140,7 +258,7 @@ impl Bounds {
 
 /// Lanes whose bits are set.
 #[inline(always)]
-fn mask_of<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x16<S> {
+pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x16<S> {
     let set = f32x16::from_fn(simd, |i| if bits & (1 << i) != 0 { 1.0 } else { 0.0 });
     set.simd_gt(f32x16::splat(simd, 0.0))
 }
@@ -296,7 +414,28 @@ impl ReceiverBox {
     }
 }
 
-/// Of the triangles `candidates` of a group, those that may meet a line of the shaft.
+/// What triangles of a group are for a shaft, a bit each. What is said of others than those kept means nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Culled {
+    /// Some line of the shaft may meet it.
+    pub(crate) kept: u32,
+    /// Its plane certainly lies between all receivers and all of the light.
+    pub(crate) between: u32,
+    /// The line in the middle of the shaft certainly passes inside of all edges.
+    pub(crate) middle: u32,
+    /// Not all lines certainly pass inside of this edge.
+    pub(crate) cut: [u32; 3],
+}
+
+impl Culled {
+    /// Those that certainly hide all of the light from all receivers.
+    #[inline(always)]
+    pub(crate) fn covering(&self) -> u32 {
+        self.kept & self.between & !(self.cut[0] | self.cut[1] | self.cut[2])
+    }
+}
+
+/// Sorts out the triangles `candidates` of a group.
 #[inline(always)]
 pub(crate) fn culled<S: Simd>(
     simd: S,
@@ -304,20 +443,26 @@ pub(crate) fn culled<S: Simd>(
     light: &LightBox,
     receivers: &ReceiverBox,
     candidates: u32,
-) -> u32 {
+) -> Culled {
     let splat = |v: f32| f32x16::splat(simd, v);
     let (p, h, axes) = (receivers.middle, receivers.half, &receivers.axes);
     let over = |v: [f32x16<S>; 3]| {
         dot(simd, v, axes[0]).abs() + dot(simd, v, axes[1]).abs() + dot(simd, v, axes[2]).abs()
     };
     let normal = load3(simd, &group.normal);
-    let before = dot(simd, normal, p) - f32x16::from_slice(simd, &group.height) - over(normal);
+    let plane = dot(simd, normal, p) - f32x16::from_slice(simd, &group.height);
+    let thickness = over(normal);
     // The box has rounding errors of its own.
     let slack = |error: f32| splat(error * 2.0);
-    let mut kept = !before.simd_gt(slack(receivers.plane_error));
-    if (kept.to_bitmask() as u32 & candidates) == 0 {
-        return 0;
+    let behind = !(plane - thickness).simd_gt(slack(receivers.plane_error));
+    let mut kept = behind.to_bitmask() as u32 & candidates;
+    if kept == 0 {
+        return Culled::default();
     }
+    let between = (plane + thickness).simd_lt(-slack(receivers.plane_error));
+    let slack = slack(receivers.edge_error);
+    let mut least_middle = splat(f32::INFINITY);
+    let mut cut = [0; 3];
     for i in 0..3 {
         let (m, e) = (load3(simd, &group.m[i]), load3(simd, &group.e[i]));
         let cross = |a: usize, b: usize, add: f32x16<S>| e[a].mul_add(splat(p[b]), add) - e[b] * splat(p[a]);
@@ -325,13 +470,23 @@ pub(crate) fn culled<S: Simd>(
         let sizes = abs3(e);
         let spread = |a: usize, b: usize| sizes[a] * splat(h[b]) + sizes[b] * splat(h[a]);
         let spreads = [spread(1, 2), spread(2, 0), spread(0, 1)];
-        let mut most = dot(simd, gradient, light.middle)
-            + dot(simd, abs3(gradient), light.half)
-            + dot(simd, spreads, light.reach);
+        let mut middle = dot(simd, gradient, light.middle);
+        let mut spread = dot(simd, abs3(gradient), light.half) + dot(simd, spreads, light.reach);
         if light.weight != 0.0 {
-            most = most - dot(simd, m, p) + over(m);
+            middle = middle - dot(simd, m, p);
+            spread = spread + over(m);
         }
-        kept &= !most.simd_lt(-slack(receivers.edge_error));
+        kept &= !((middle + spread).simd_lt(-slack).to_bitmask() as u32);
+        if kept == 0 {
+            return Culled::default();
+        }
+        cut[i] = !((middle - spread).simd_gt(slack).to_bitmask() as u32);
+        least_middle = least_middle.min(middle);
     }
-    kept.to_bitmask() as u32 & candidates
+    Culled {
+        kept,
+        between: between.to_bitmask() as u32 & !group.crossing,
+        middle: least_middle.simd_gt(slack).to_bitmask() as u32,
+        cut,
+    }
 }
