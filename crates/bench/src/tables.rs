@@ -212,7 +212,9 @@ fn build(job: &Job) {
 
 fn untested(job: &Job) -> f64 {
     let visibility = Visibility::trace(&eye_grid(job), &|| ());
-    let counts = Rayward::new(CasterPolicy::Auto).lit(job, &visibility, job.light).counts;
+    let counts = Rayward::new(CasterPolicy::Auto)
+        .lit(job, &visibility, job.light)
+        .counts;
     counts.untested as f64 / counts.receivers.max(1) as f64
 }
 

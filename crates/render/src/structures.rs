@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch, PointLightGrid,
-    SimdLevel, Tile, Triangles, View, Visibility,
+    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
+    PointLightGrid, SimdLevel, Tile, Triangles, View, Visibility,
 };
 
 use crate::casters::CasterRules;
@@ -154,7 +154,7 @@ impl<'g> FrameStructures<'g> {
         plan: &FramePlan,
         geometry: &'g FrameGeometry,
         clusters: &'g Clusters,
-        rules: &CasterRules,
+        rules: &CasterRules<'g>,
         eye_point: Light,
         options: &RenderOptions,
     ) {
@@ -168,10 +168,12 @@ impl<'g> FrameStructures<'g> {
             return;
         }
         self.visibility = Some(Visibility::trace(&self.eye, &|| ()));
+        let mut scratch = LitScratch::default();
         for (plan, shadows) in plan.lights.iter().zip(&mut self.lights) {
             if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
                 let seen = self.visibility.as_ref();
-                *shadows = shadows_of(plan, seen, geometry, rules, eye_point, level);
+                let geometry = (geometry, clusters);
+                *shadows = shadows_of(plan, seen, geometry, rules, eye_point, (level, &mut scratch));
             }
         }
     }

@@ -463,7 +463,7 @@ pub(crate) fn culled<S: Simd>(
     let slack = slack(receivers.edge_error);
     let mut least_middle = splat(f32::INFINITY);
     let mut cut = [0; 3];
-    for i in 0..3 {
+    for (i, cut) in cut.iter_mut().enumerate() {
         let (m, e) = (load3(simd, &group.m[i]), load3(simd, &group.e[i]));
         let cross = |a: usize, b: usize, add: f32x16<S>| e[a].mul_add(splat(p[b]), add) - e[b] * splat(p[a]);
         let gradient = [cross(1, 2, m[0]), cross(2, 0, m[1]), cross(0, 1, m[2])];
@@ -473,14 +473,14 @@ pub(crate) fn culled<S: Simd>(
         let mut middle = dot(simd, gradient, light.middle);
         let mut spread = dot(simd, abs3(gradient), light.half) + dot(simd, spreads, light.reach);
         if light.weight != 0.0 {
-            middle = middle - dot(simd, m, p);
-            spread = spread + over(m);
+            middle -= dot(simd, m, p);
+            spread += over(m);
         }
         kept &= !((middle + spread).simd_lt(-slack).to_bitmask() as u32);
         if kept == 0 {
             return Culled::default();
         }
-        cut[i] = !((middle - spread).simd_gt(slack).to_bitmask() as u32);
+        *cut = !((middle - spread).simd_gt(slack).to_bitmask() as u32);
         least_middle = least_middle.min(middle);
     }
     Culled {
