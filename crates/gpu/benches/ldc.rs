@@ -1,9 +1,9 @@
 //! How well and how fast the layered depth cube answers, on the CPU and on a GPU, beside the hierarchy that is its truth.
 //!
-//! `cargo bench -p rayward-gpu --bench ldc [-- SCENE...]`. For each scene and resolution: time of every build, samples,
+//! `cargo bench -p rayward-gpu --bench ldc [-- SCENE... RAYS]`. For each scene and resolution: time of every build, samples,
 //! layers, memory; then, over the same rays, how often each hit test misses, hits what is not there or another
 //! triangle, how far off it is, and the time and steps of a ray. A third of the rays are random, a third along axes
-//! or in a plane of two, a third leave surfaces as reflections. The CPU traces a million on one thread, the GPU, if
+//! or in a plane of two, a third leave surfaces as reflections. The CPU traces a million, or as many as are asked for, on one thread, the GPU, if
 //! there is one, ten thousand of them; times are medians of three.
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` where it is set. Run as a test it does little.
@@ -22,11 +22,16 @@ fn main() {
         .build_global()
         .expect("one pool");
     let test = !std::env::args().any(|a| a == "--bench");
-    let named: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
+    let count = words.iter().find_map(|word| word.parse().ok());
+    let named: Vec<String> = words
+        .into_iter()
+        .filter(|w| w.parse::<usize>().is_err())
+        .collect();
     let (resolutions, rays): (&[u32], usize) = if test {
         (&[64], 300)
     } else {
-        (&[512, 1024], 1_000_000)
+        (&[512, 1024], count.unwrap_or(1_000_000))
     };
     let names = if test {
         vec!["blob-1k".into()]
