@@ -16,6 +16,7 @@
 //! a reference of one face. What is left is a bit a pixel. Limits: perspective eyes in lanes, others pixel by
 //! pixel; where coordinates pass 1e30 every caster is tested for every pixel.
 
+mod asked;
 mod casters;
 mod gather;
 mod light_tile;

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::test_meshes::{Mesh, axes, looking};
-use crate::{Casts, EyeGrid, EyeGridOptions, Receiver};
+use crate::{Accel, BruteForce, Casts, EyeGrid, EyeGridOptions, Receiver};
 
 /// Every pixel of a view by brute force: `None` where nothing is seen, else the triangle and whether the light
 /// reaches it.
@@ -44,6 +44,13 @@ fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
         let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
         let visibility = Visibility::trace(&grid, &|| ());
         let lit = LitPixels::find(&visibility, &triangles, &clusters, query, level, &mut scratch);
+        let brute = BruteForce::new(triangles);
+        let all = |receivers: &[Receiver]| {
+            let dark = receivers.par_iter().map(|r| brute.shadowed(r, &query.light));
+            Some(dark.collect())
+        };
+        let every_side = (0..triangles.len() as u32).all(|p| (query.rule)(p) == Casts::Both);
+        let asked = LitPixels::asked(&visibility, &triangles, query, all).filter(|_| every_side);
         for index in 0..grid.tile_count() {
             let tile = grid.tile(index);
             for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
@@ -51,6 +58,10 @@ fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
                 let want = expected[(py * view.width + px) as usize];
                 let seen = visibility.prim(index, x, y);
                 let got = seen.map(|prim| (prim, lit.is_lit(index, x, y)));
+                if let Some(asked) = &asked {
+                    let got = seen.map(|prim| (prim, asked.is_lit(index, x, y)));
+                    assert_eq!(got, want, "asked, {name}, {px} {py}");
+                }
                 let place = || format!("{name}, {}, {:?}, {px} {py}", level.name(), query.light);
                 assert_eq!(got, want, "{}", place());
             }
