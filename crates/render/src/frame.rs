@@ -1,5 +1,6 @@
 //! One frame, in the papers' order: plan, structures, tiles, image.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
@@ -13,7 +14,7 @@ use crate::geometry::triangles;
 use crate::mean::Mean;
 use crate::plan::FramePlan;
 use crate::reference::EveryTriangle;
-use crate::secondary::SecondaryTracer;
+use crate::secondary::{HierarchyBuilder, SecondaryBuilder, SecondaryTracer};
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
 use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
@@ -24,6 +25,7 @@ pub struct Renderer<'s> {
     scene: &'s Scene,
     shader: Shader<'s>,
     environment: Option<Environment>,
+    secondary: Arc<dyn SecondaryBuilder>,
     topology: Option<(Vec<[u32; 3]>, Topology, Clusters)>,
 }
 
@@ -52,6 +54,7 @@ impl<'s> Renderer<'s> {
             scene,
             shader: Shader::new(scene),
             environment: None,
+            secondary: Arc::new(HierarchyBuilder),
             topology: None,
         }
     }
@@ -59,6 +62,11 @@ impl<'s> Renderer<'s> {
     /// Lights the scene with an environment, or with the ambient light of the options again.
     pub fn set_environment(&mut self, environment: Option<Environment>) {
         self.environment = environment;
+    }
+
+    /// Has another structure answer rays from anywhere to anywhere. Frames with a lens or a shutter have none.
+    pub fn set_secondary(&mut self, builder: Arc<dyn SecondaryBuilder>) {
+        self.secondary = builder;
     }
 
     /// Renders one frame on the threads of the current rayon pool. The picture is the same for any number of
@@ -101,7 +109,9 @@ impl<'s> Renderer<'s> {
         let samples = options.pixel_samples.max(1);
         let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));
         let first = shifted(samples - 1);
-        let mut structures = FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options);
+        let secondary = &*self.secondary;
+        let mut structures =
+            FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options, secondary);
         let build = start.elapsed();
 
         let start = Instant::now();

@@ -63,7 +63,9 @@ pub use lens::Lens;
 pub use options::{CasterPolicy, RenderOptions};
 pub use pixel_filter::PixelFilter;
 pub use plan::{FramePlan, LightPlan};
-pub use secondary::{SecondaryTracer, SurfaceHit};
+pub use secondary::{
+    BuiltTracer, CubeBuilder, HierarchyBuilder, SecondaryBuilder, SecondaryTracer, SurfaceHit,
+};
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use stats::{FrameStats, StructureStats};
 pub use structures::{FrameStructures, LightShadows};

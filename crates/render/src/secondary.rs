@@ -3,9 +3,10 @@
 
 use std::fmt::Debug;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use rayward_trace::exact::ExactHit;
-use rayward_trace::{Bvh, Light, Receiver, SurfaceRay, ViewRay};
+use rayward_trace::{Bvh, Ldc, LdcOptions, Light, Receiver, SurfaceRay, Triangles, ViewRay};
 
 /// The first triangle that a ray meets, and where; `None` if it meets none.
 pub type SurfaceHit = Option<(u32, ExactHit)>;
@@ -24,6 +25,93 @@ pub trait SecondaryTracer: Debug + Send + Sync {
 
     /// Replaces `hits` by all triangles in front of the start of a ray, as parameters and ids in ascending order.
     fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>);
+
+    /// Whether any triangle lies between each receiver and the light, from structures that would rather have arrays
+    /// than single rays; `None` from others.
+    fn shadowed(&self, _receivers: &[Receiver], _light: &Light) -> Option<Vec<bool>> {
+        None
+    }
+}
+
+/// Builds such a structure for each frame.
+pub trait SecondaryBuilder: Debug + Send + Sync {
+    /// Builds over all triangles of a frame.
+    fn build<'g>(&'g self, triangles: Triangles<'g>) -> BuiltTracer<'g>;
+
+    /// Whether hard shadows of all pixels are asked of it, too, by [`SecondaryTracer::shadowed`].
+    fn takes_shadows(&self) -> bool {
+        false
+    }
+}
+
+/// A structure for rays from anywhere to anywhere, and what it is.
+#[derive(Debug)]
+pub struct BuiltTracer<'g> {
+    /// The structure.
+    pub tracer: Arc<dyn SecondaryTracer + 'g>,
+    /// Its name in what a frame tells of itself.
+    pub name: &'static str,
+    /// Its memory.
+    pub bytes: usize,
+    /// Its cells; 0 if it has none.
+    pub cells: usize,
+    /// Entries of lists of triangles.
+    pub references: usize,
+}
+
+/// Builds the hierarchy, which is what frames use unless told otherwise.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HierarchyBuilder;
+
+impl SecondaryBuilder for HierarchyBuilder {
+    fn build<'g>(&'g self, triangles: Triangles<'g>) -> BuiltTracer<'g> {
+        let bvh = Bvh::build(triangles);
+        BuiltTracer {
+            name: "hierarchy for other rays",
+            bytes: bvh.bytes(),
+            cells: 0,
+            references: bvh.stats().triangles,
+            tracer: Arc::new(bvh),
+        }
+    }
+}
+
+/// Builds the layered depth cube (VMV07), its samples naming every triangle over a texel: exact.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CubeBuilder(pub LdcOptions);
+
+impl SecondaryBuilder for CubeBuilder {
+    fn build<'g>(&'g self, triangles: Triangles<'g>) -> BuiltTracer<'g> {
+        let cube = Ldc::build(triangles, &self.0);
+        let [width, height, depth] = cube.size().map(|side| side as usize);
+        BuiltTracer {
+            name: "layered depth cube for other rays",
+            bytes: cube.bytes(),
+            cells: width * height + height * depth + depth * width,
+            references: cube.samples().iter().sum(),
+            tracer: Arc::new(cube),
+        }
+    }
+}
+
+impl SecondaryTracer for Ldc<'_> {
+    fn trace(&self, rays: &[SurfaceRay], hits: &mut Vec<SurfaceHit>) {
+        hits.clear();
+        hits.extend(rays.iter().map(|ray| self.after(ray, &mut ())));
+    }
+
+    fn each_between(
+        &self,
+        receiver: &Receiver,
+        light: &Light,
+        visit: &mut dyn FnMut(u32) -> ControlFlow<()>,
+    ) {
+        self.each_shadow(receiver, light, &mut (), visit);
+    }
+
+    fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>) {
+        Ldc::along(self, ray, &mut (), hits);
+    }
 }
 
 impl SecondaryTracer for Bvh<'_> {

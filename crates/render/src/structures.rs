@@ -5,17 +5,17 @@ use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Bvh, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
-    PointLightGrid, SimdLevel, Tile, Triangles, View, Visibility,
+    AreaLightTree, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
+    PointLightGrid, Receiver, SimdLevel, Tile, Triangles, View, Visibility,
 };
 
 use crate::casters::CasterRules;
 use crate::geometry::triangles;
 use crate::plan::{FramePlan, LightPlan};
 use crate::reference::EveryTriangle;
-use crate::secondary::SecondaryTracer;
+use crate::secondary::{SecondaryBuilder, SecondaryTracer};
 use crate::tile::TileCounts;
-use crate::{RenderOptions, StructureStats};
+use crate::{CasterPolicy, RenderOptions, StructureStats};
 
 /// All structures of one frame.
 #[derive(Debug)]
@@ -34,6 +34,8 @@ pub struct FrameStructures<'g> {
     pub layers: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// The same, for rays that leave surfaces; `None` if nothing sends any.
     pub secondary: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// The same, if hard shadows of all pixels are asked of it.
+    pub shadows: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// Whether any triangle is masked or blended.
     pub transparent: bool,
     /// What each structure cost.
@@ -66,6 +68,7 @@ impl<'g> FrameStructures<'g> {
         rules: &CasterRules<'g>,
         eye_point: Light,
         options: &RenderOptions,
+        builder: &'g dyn SecondaryBuilder,
     ) -> Self {
         let triangles = triangles(geometry);
         let mut stats = Timed::default();
@@ -83,6 +86,14 @@ impl<'g> FrameStructures<'g> {
             let trace = || Visibility::trace(&eye, &|| ());
             stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
         });
+
+        let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
+        let through = (soft || options.reference) && rules.any_transparent();
+        // It knows of no triangles that cast by one side alone.
+        let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
+        let general =
+            (through || plan.secondary || shadows).then(|| general(triangles, options, builder, &mut stats));
+        let asked = general.as_deref().filter(|_| shadows);
 
         let mut scratch = LitScratch::default();
         let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
@@ -110,6 +121,7 @@ impl<'g> FrameStructures<'g> {
                 rules,
                 eye_point,
                 (options.level, &mut scratch),
+                asked,
             );
             stats.0.push(shadows.stats(&name, start));
             lights.push(shadows);
@@ -131,9 +143,6 @@ impl<'g> FrameStructures<'g> {
                 |veils| [veils.bytes(), veils.cell_count(), veils.reference_count()],
             )
         });
-        let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
-        let through = (soft || options.reference) && rules.any_transparent();
-        let general = (through || plan.secondary).then(|| general(triangles, options, &mut stats));
         Self {
             eye,
             visibility,
@@ -142,7 +151,8 @@ impl<'g> FrameStructures<'g> {
             light_veils,
             layers: general.clone().filter(|_| through),
             transparent: rules.any_transparent(),
-            secondary: general.filter(|_| plan.secondary),
+            secondary: general.clone().filter(|_| plan.secondary),
+            shadows: general.filter(|_| shadows),
             stats: stats.0,
         }
     }
@@ -173,7 +183,9 @@ impl<'g> FrameStructures<'g> {
             if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
                 let seen = self.visibility.as_ref();
                 let geometry = (geometry, clusters);
-                *shadows = shadows_of(plan, seen, geometry, rules, eye_point, (level, &mut scratch));
+                let asked = self.shadows.as_deref();
+                let with = (level, &mut scratch);
+                *shadows = shadows_of(plan, seen, geometry, rules, eye_point, with, asked);
             }
         }
     }
@@ -242,16 +254,22 @@ fn eye_grid<'g>(
 fn general<'g>(
     triangles: Triangles<'g>,
     options: &RenderOptions,
+    builder: &'g dyn SecondaryBuilder,
     stats: &mut Timed,
 ) -> Arc<dyn SecondaryTracer + 'g> {
     if options.reference {
         return Arc::new(EveryTriangle(triangles));
     }
-    Arc::new(stats.build(
-        "hierarchy for other rays",
-        || Bvh::build(triangles),
-        |bvh| [bvh.bytes(), 0, bvh.stats().triangles],
-    ))
+    let start = Instant::now();
+    let built = builder.build(triangles);
+    stats.0.push(StructureStats {
+        name: built.name.into(),
+        build: start.elapsed(),
+        bytes: built.bytes,
+        cells: built.cells,
+        references: built.references,
+    });
+    built.tracer
 }
 
 /// The grid of a light over masked and blended triangles.
@@ -279,6 +297,7 @@ fn shadows_of<'g>(
     rules: &CasterRules<'g>,
     eye: Light,
     (level, scratch): (SimdLevel, &mut LitScratch),
+    asked: Option<&(dyn SecondaryTracer + 'g)>,
 ) -> LightShadows<'g> {
     let triangles = triangles(geometry);
     if let Some(area) = plan.area {
@@ -295,9 +314,12 @@ fn shadows_of<'g>(
                 eye,
                 rule: &rule,
             };
-            LightShadows::Pixels(LitPixels::find(
-                visibility, &triangles, clusters, &query, level, scratch,
-            ))
+            let asked = asked.and_then(|tracer| {
+                let shadowed = |receivers: &[Receiver]| tracer.shadowed(receivers, &plan.light);
+                LitPixels::asked(visibility, &triangles, &query, shadowed)
+            });
+            let find = || LitPixels::find(visibility, &triangles, clusters, &query, level, scratch);
+            LightShadows::Pixels(asked.unwrap_or_else(find))
         }
         None => LightShadows::Grid(PointLightGrid::build(
             plan.light, triangles, &rule, plan.grid, level,
