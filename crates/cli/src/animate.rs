@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use crate::args::{AnimateArgs, FrameArgs, TargetArgs};
 use crate::failure::{Code, Failure};
+use crate::gpu::Device;
 use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
@@ -91,6 +92,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
     bar.frames(wanted.len() as u64);
     let mut renderer = Renderer::new(&input.scene);
     renderer.set_environment(environment);
+    let device = Device::open(&args.run, &mut renderer)?;
     let mut job = Job {
         args,
         input: &input,
@@ -108,6 +110,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         }
     }
     drop(bar);
+    device.close(args.run.quiet)?;
     if !args.run.quiet {
         let there = (frames.end - frames.start) as usize - wanted.len();
         report::note(&format!(

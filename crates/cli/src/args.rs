@@ -10,7 +10,8 @@ use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Casters, Exposure, Filter, LayerName, LightValue, Operator, Shard, Size, Span, Up,
+    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shard, Size,
+    Span, Up,
 };
 
 const HELP: &str = "\
@@ -378,6 +379,15 @@ pub(crate) struct RunArgs {
     /// Instruction set: one that `rayward doctor` lists; the best unless given. The picture does not depend on it
     #[arg(long, value_name = "LEVEL")]
     pub(crate) simd: Option<String>,
+    /// Reflections, refractions and hard shadows on a GPU; auto takes the CPU where there is none but software. The
+    /// picture does not depend on it
+    #[arg(long, value_name = "on|auto|off", default_value = "off", default_missing_value = "on", num_args = 0..=1,
+        require_equals = true, conflicts_with_all = ["aperture", "shutter", "reference", "secondary"])]
+    pub(crate) gpu: GpuUse,
+    /// What answers reflections and refractions on the CPU. The picture does not depend on it
+    #[arg(long, value_name = "STRUCTURE", default_value = "hierarchy",
+        conflicts_with_all = ["aperture", "shutter", "reference"])]
+    pub(crate) secondary: SecondaryUse,
     /// The summary as one JSON object on standard output
     #[arg(long)]
     pub(crate) json: bool,

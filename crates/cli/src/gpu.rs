@@ -1,11 +1,76 @@
-//! What there is of GPUs, and whether the first one answers rays as it should.
+//! What there is of GPUs, whether the first one answers rays as it should, and frames on it.
+
+use std::sync::Arc;
 
 use glam::Vec3;
 use rayward::scene::builtin;
 use rayward::trace::{Accel, Bvh, Ray};
-use rayward::triangles;
-use rayward_gpu::{AdapterSummary, Cube, CubeOptions, Gpu, adapters};
+use rayward::{CubeBuilder, Renderer, triangles};
+use rayward_gpu::{AdapterSummary, Cube, CubeOptions, Gpu, GpuSecondary, adapters};
 use serde::Serialize;
+
+use crate::args::RunArgs;
+use crate::failure::{Code, Failure};
+use crate::report::{self, thousands};
+use crate::values::{GpuUse, SecondaryUse};
+
+/// The device that frames are made with, if they are.
+pub(crate) struct Device(Option<Arc<GpuSecondary>>, GpuUse);
+
+impl Device {
+    /// Opens what was asked for and has the renderer use it.
+    pub(crate) fn open(args: &RunArgs, renderer: &mut Renderer) -> Result<Self, Failure> {
+        if args.secondary == SecondaryUse::Cube {
+            renderer.set_secondary(Arc::new(CubeBuilder::default()));
+        }
+        let none = Self(None, args.gpu);
+        if args.gpu == GpuUse::Off {
+            return Ok(none);
+        }
+        let problem = match Gpu::open(None) {
+            Ok(gpu) if args.gpu == GpuUse::On || !gpu.adapter().software => {
+                let device = Arc::new(GpuSecondary::new(gpu, CubeOptions::default()));
+                renderer.set_secondary(Arc::clone(&device) as Arc<_>);
+                return Ok(Self(Some(device), args.gpu));
+            }
+            Ok(gpu) => format!("{} is software", gpu.adapter().name),
+            Err(problem) => problem.to_string(),
+        };
+        if args.gpu == GpuUse::On {
+            return Err(Failure::new(Code::Runtime, problem));
+        }
+        if !args.quiet {
+            report::note(&format!("on the CPU: {}", report::clean(&problem)));
+        }
+        Ok(none)
+    }
+
+    /// Tells what it has done. An error of a device that was to be used is ours, too.
+    pub(crate) fn close(&self, quiet: bool) -> Result<(), Failure> {
+        let Self(Some(device), asked) = self else {
+            return Ok(());
+        };
+        let name = report::clean(&device.gpu().adapter().name);
+        match device.problem() {
+            Some(problem) if *asked == GpuUse::On => Err(Failure::new(Code::Runtime, problem)),
+            Some(problem) => {
+                report::note(&format!("on the CPU: {}", report::clean(&problem.to_string())));
+                Ok(())
+            }
+            None => {
+                let stats = device.stats();
+                if !quiet {
+                    report::note(&format!(
+                        "{name}: {} rays, {} of them answered on the CPU",
+                        thousands(stats.rays),
+                        thousands(stats.unsure)
+                    ));
+                }
+                Ok(())
+            }
+        }
+    }
+}
 
 /// The findings; its fields are those of the JSON object.
 #[derive(Serialize)]

@@ -7,6 +7,7 @@ use rayward::{Environment, Lens, Progress, RenderOptions, RenderedFrame, Rendere
 
 use crate::args::{PictureArgs, RenderArgs, ViewArgs};
 use crate::failure::{Code, Failure};
+use crate::gpu::Device;
 use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
@@ -56,6 +57,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let prepare_start = Instant::now();
     let mut renderer = Renderer::new(&input.scene);
     renderer.set_environment(environment);
+    let device = Device::open(&args.run, &mut renderer)?;
     let prepare = prepare_start.elapsed();
     bar.phase("rendering");
     let show = |progress| bar.show(progress);
@@ -64,6 +66,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         ..options
     };
     let rendered = picture(args, &input, &mut renderer, (&frame, &view), &options, &show)?;
+    device.close(args.run.quiet)?;
     bar.phase("writing");
     let write_start = Instant::now();
     let files = targets.write(&rendered.film)?;

@@ -268,6 +268,26 @@ impl From<Up> for scene::UpAxis {
     }
 }
 
+/// Whether a GPU is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum GpuUse {
+    /// Any there is, also one in software; an error if there is none
+    On,
+    /// Hardware, or else the CPU
+    Auto,
+    /// The CPU
+    Off,
+}
+
+/// A structure for rays from anywhere to anywhere.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum SecondaryUse {
+    /// A tree of boxes
+    Hierarchy,
+    /// The layered depth cube
+    Cube,
+}
+
 /// Which sides of triangles cast shadows.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
 pub(crate) enum Casters {

@@ -6,6 +6,7 @@
 //! | `commands.rs` | buffers, dispatches, reading back |
 //! | `ldc/build.rs`, `raster.wgsl` and others | triangles to a cube |
 //! | `ldc/trace.rs`, `walk.wgsl` and others | rays through a cube |
+//! | `secondary.rs` | the cube in frames of `rayward` |
 //!
 //! [`trace::ldc`] is the reference of every stage. Rays are arrays in, answers arrays out. Hits by samples are those
 //! of the reference but for rounding. Exact answers are those of [`trace::BruteForce`] bit for bit: the GPU has f32
@@ -34,9 +35,11 @@ mod commands;
 mod device;
 mod error;
 mod ldc;
+mod secondary;
 
 pub use rayward_trace as trace;
 
 pub use device::{AdapterSummary, Gpu, adapters};
 pub use error::{Error, Result};
 pub use ldc::{Cube, CubeOptions, TraceStats};
+pub use secondary::GpuSecondary;

@@ -5,6 +5,7 @@ mod bad_input;
 mod bench;
 mod commands;
 mod environment;
+mod gpu;
 mod render;
 #[cfg(target_os = "linux")]
 mod signals;

@@ -1,0 +1,57 @@
+//! `render` on a GPU, through the cube, and without a driver.
+
+use std::process::Command;
+
+use crate::support::{Folder, Run};
+
+const SMALL: [&str; 5] = ["render", "--builtin", "teapot-mirror", "--resolution", "64x48"];
+
+fn small<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&SMALL, more].concat()
+}
+
+/// Runs it where no driver is found.
+fn without_driver(mut command: Command) -> Run {
+    command
+        .env("VK_DRIVER_FILES", "/nowhere.json")
+        .env("VK_ICD_FILENAMES", "/nowhere.json");
+    Run::from(command.output().expect("the program runs"))
+}
+
+#[test]
+fn pictures_do_not_depend_on_what_answers_their_rays() {
+    let folder = Folder::new();
+    folder.run(&small(&["-o", "hierarchy.png"])).expect(0);
+    folder
+        .run(&small(&["--secondary", "cube", "-o", "cube.png"]))
+        .expect(0);
+    folder.run(&["compare", "hierarchy.png", "cube.png"]).expect(0);
+    let doctor = folder.run(&["doctor", "--json"]).expect(0).json();
+    let on_gpu = folder.run(&small(&["--gpu", "-o", "gpu.png"]));
+    if let Some(name) = doctor["gpu"]["used"].as_str() {
+        let told = on_gpu.expect(0).stderr;
+        assert!(
+            told.contains(name) && told.contains("answered on the CPU"),
+            "{told}"
+        );
+        folder.run(&["compare", "hierarchy.png", "gpu.png"]).expect(0);
+    } else {
+        on_gpu.expect(1).says(&["no GPU"]);
+    }
+}
+
+#[test]
+fn a_missing_gpu_is_an_error_or_said() {
+    let folder = Folder::new();
+    if cfg!(target_os = "linux") {
+        without_driver(folder.command(&small(&["--gpu", "-o", "a.png"])))
+            .expect(1)
+            .says(&["no GPU"]);
+        let auto = without_driver(folder.command(&small(&["--gpu=auto", "-o", "a.png"])));
+        let told = auto.expect(0).stderr;
+        assert!(told.contains("on the CPU: no GPU"), "{told}");
+    }
+    folder
+        .run(&small(&["--gpu", "--secondary", "cube", "-o", "a.png"]))
+        .expect(2);
+}
