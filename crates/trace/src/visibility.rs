@@ -39,20 +39,21 @@ impl Visibility {
 
     /// As [`Self::trace`], giving each tile and its hits to `use_it`, from any thread.
     pub fn trace_and(grid: &EyeGrid, use_it: &(dyn Fn(&Tile, &TileHits) + Sync)) -> Self {
-        let traced: Vec<(VisibleTile, u64)> = (0..grid.tile_count())
+        let traced: Vec<(VisibleTile, u64, u64)> = (0..grid.tile_count())
             .into_par_iter()
             .map_init(TileHits::default, |hits, index| {
                 let tile = grid.tile(index);
                 grid.trace_tile(&tile, hits);
                 use_it(&tile, hits);
-                (VisibleTile::of(tile, hits), hits.exact_pixels as u64)
+                let tile = VisibleTile::of(tile, hits);
+                let seen = tile.seen();
+                (tile, hits.exact_pixels as u64, seen)
             })
             .collect();
         let exact_pixels = traced.iter().map(|t| t.1).sum();
-        let prims = traced.iter().flat_map(|t| &t.0.prims);
-        let seen = prims.map(|block| block.iter().filter(|&&p| p != NONE).count() as u64);
+        let seen = traced.iter().map(|t| t.2).sum();
         Self {
-            seen: seen.sum(),
+            seen,
             view: *grid.view(),
             tiles: traced.into_iter().map(|t| t.0).collect(),
             exact_pixels,
@@ -104,8 +105,12 @@ pub(crate) fn place(stride: u32, x: u32, y: u32) -> (usize, usize) {
 impl VisibleTile {
     fn of(tile: Tile, hits: &TileHits) -> Self {
         let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
-        let blocks = (0..rows).flat_map(|row| (0..stride).map(move |column| (column, row)));
-        let mut prims: Vec<_> = blocks.map(|(column, row)| hits.block(column, row).prim).collect();
+        let mut prims = Vec::with_capacity((stride * rows) as usize);
+        for row in 0..rows {
+            for column in 0..stride {
+                prims.push(hits.block(column, row).prim);
+            }
+        }
         // Blocks reach beyond the raster's edge.
         if !tile.width.is_multiple_of(BLOCK) || !tile.height.is_multiple_of(BLOCK) {
             for y in 0..rows * BLOCK {
@@ -118,6 +123,17 @@ impl VisibleTile {
             }
         }
         Self { tile, stride, prims }
+    }
+
+    /// Pixels that see a triangle.
+    fn seen(&self) -> u64 {
+        let mut seen = 0;
+        for block in &self.prims {
+            for &prim in block {
+                seen += u32::from(prim != NONE);
+            }
+        }
+        u64::from(seen)
     }
 
     /// The ray of a pixel, by block and lane.

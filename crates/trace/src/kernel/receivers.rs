@@ -533,7 +533,8 @@ fn largest_plane<S: Simd>(
 /// The boxes of a node that a caster certainly covers, before their nearest receiver.
 #[inline(always)]
 fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Sides) -> u32 {
-    let least_at = largest.map(|at| at.map(|side| 1 - side));
+    let [[ax, ay], [bx, by], [cx, cy]] = largest;
+    let least_at = [[1 - ax, 1 - ay], [1 - bx, 1 - by], [1 - cx, 1 - cy]];
     // Twice what is certain for one receiver.
     let covers = edges_at(simd, node, record, least_at).simd_gt(f32x16::splat(simd, 2.0));
     let [[x_low, x_high], [y_low, y_high]] = &node.sides;

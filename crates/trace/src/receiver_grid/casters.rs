@@ -241,7 +241,8 @@ impl Finder<'_> {
     /// Takes a triangle that lies in front.
     #[inline]
     fn take_ahead(&mut self, batch: &CasterBatch, lane: usize, prim: u32) {
-        let rect = [0, 1, 2, 3].map(|i: usize| batch.tiles[i][lane] as u32);
+        let tile = |i: usize| batch.tiles[i][lane] as u32;
+        let rect = [tile(0), tile(1), tile(2), tile(3)];
         let nearest = batch.nearest[lane];
         if !self.any_tile(rect, nearest) || !self.casts(prim) {
             return;

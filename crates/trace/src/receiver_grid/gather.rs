@@ -67,9 +67,11 @@ impl Part {
     }
 }
 
-/// Tiles of the eye's in a part: so few that all threads have some, and no more parts than each light tile can look
-/// through.
-pub(super) const PART: usize = 16;
+/// Tiles of the eye's in a part at least: few, so that all threads have some.
+const PART: usize = 16;
+
+/// Parts at most, for each light tile looks through all of them.
+const PARTS: usize = 1024;
 
 /// Working memory of one thread.
 #[derive(Default)]
@@ -95,8 +97,9 @@ pub(super) fn gather(
     parts: &mut Vec<Part>,
 ) {
     let tiles = visibility.tiles();
-    parts.resize_with(tiles.len().div_ceil(PART), Part::default);
-    let both = parts.par_iter_mut().zip(tiles.par_chunks(PART)).enumerate();
+    let size = tiles.len().div_ceil(PARTS).max(PART);
+    parts.resize_with(tiles.len().div_ceil(size), Part::default);
+    let both = parts.par_iter_mut().zip(tiles.par_chunks(size)).enumerate();
     both.for_each_init(GatherWork::default, |work, (index, (part, tiles))| {
         part.points.clear();
         part.asked.clear();
@@ -105,7 +108,7 @@ pub(super) fn gather(
             work.find_spans(visibility, triangles, query, tile, level);
             work.find_points(visibility, triangles, tile, level);
             let asking = Asking {
-                eye_tile: (index * PART + i) as u32,
+                eye_tile: (index * size + i) as u32,
                 part: index as u16,
                 prims: &tile.prims,
                 rays: &work.rays,

@@ -91,7 +91,7 @@ pub struct LightQuery<'q> {
 
 /// Pixels of a face for each light tile: enough that cells of the largest size are full, for half of a face is empty
 /// as a rule and pixels that turn away do not count. Tests have small pictures and want many tiles all the same.
-const PIXELS_A_TILE: u64 = if cfg!(test) { 150 } else { 6000 };
+const PIXELS_A_TILE: u64 = if cfg!(test) { 150 } else { 3000 };
 
 /// Largest number of light tiles of a face in each direction.
 const MAX_TILES: u32 = 32;

@@ -40,9 +40,16 @@ fn check(name: &str, mesh: &Mesh, view: View, query: &LightQuery) -> [u64; 4] {
     let expected = reference(&triangles, &view, query);
     let clusters = Clusters::new(&triangles);
     let (mut counts, mut scratch) = (LitCounts::default(), LitScratch::default());
+    // What an earlier light has left there.
+    let other = LightQuery {
+        light: Light::Point(Vec3::new(0.2, 0.1, -0.4)),
+        cone: None,
+        ..*query
+    };
     for level in SimdLevel::available() {
         let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
         let visibility = Visibility::trace(&grid, &|| ());
+        LitPixels::find(&visibility, &triangles, &clusters, &other, level, &mut scratch);
         let lit = LitPixels::find(&visibility, &triangles, &clusters, query, level, &mut scratch);
         let brute = BruteForce::new(triangles);
         let all = |receivers: &[Receiver]| {
