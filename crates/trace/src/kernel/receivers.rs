@@ -17,6 +17,7 @@ use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
 use super::pixels::{BlockPoints, Entry, LIGHT_TILE};
 use super::tile::NONE;
 use super::{LANES, NEARNESS_BAND, SimdLevel, bits_of, max3, min3};
+use crate::visibility::VisibleTile;
 
 /// Columns and rows of the cells that the Morton curve passes.
 const CURVE_SIDE: u32 = 32;
@@ -82,14 +83,19 @@ impl Node {
     };
 }
 
-/// Points of all parts of the eye's tiles.
-pub(crate) type Parts<'p> = &'p [&'p [BlockPoints]];
+/// All points, and what the eye sees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Points<'p> {
+    /// Part by part of the eye's tiles.
+    pub(crate) parts: &'p [&'p [BlockPoints]],
+    pub(crate) tiles: &'p [VisibleTile],
+}
 
 impl Held {
     /// The points that its lanes are among.
     #[inline(always)]
-    pub(crate) fn points<'p>(&self, parts: Parts<'p>) -> &'p BlockPoints {
-        &parts[self.part as usize][self.points as usize]
+    pub(crate) fn points<'p>(&self, points: Points<'p>) -> &'p BlockPoints {
+        &points.parts[self.part as usize][self.points as usize]
     }
 }
 
@@ -264,9 +270,9 @@ pub(crate) fn draw_casters(
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
     (corner, rounding): ([f32; 2], f32),
-    parts: Parts,
+    points: Points,
 ) -> u32 {
-    dispatch!(level.0, simd => draw_casters_impl(simd, tile, vertices, edges, (corner, rounding), parts))
+    dispatch!(level.0, simd => draw_casters_impl(simd, tile, vertices, edges, (corner, rounding), points))
 }
 
 #[inline(always)]
@@ -276,7 +282,7 @@ fn draw_casters_impl<S: Simd>(
     vertices: &VertexLanes,
     edges: &mut EdgeLanes,
     (corner, rounding): ([f32; 2], f32),
-    parts: Parts,
+    points: Points,
 ) -> u32 {
     let lanes = u32::MAX >> (32 - vertices.count as u32);
     let mut areas = AreaLanes::default();
@@ -302,7 +308,7 @@ fn draw_casters_impl<S: Simd>(
             nearest: areas.nearest[lane],
         };
         let record = edges.record(lane, vertices.prim[lane]);
-        draw_impl(simd, tile, &record, &area, parts);
+        draw_impl(simd, tile, &record, &area, points);
     }
     bad
 }
@@ -389,9 +395,9 @@ pub(crate) fn draw_caster(
     tile: &mut ReceiverTile,
     record: &EdgeRecord,
     area: &CasterArea,
-    parts: Parts,
+    points: Points,
 ) {
-    dispatch!(level.0, simd => draw_impl(simd, tile, record, area, parts));
+    dispatch!(level.0, simd => draw_impl(simd, tile, record, area, points));
 }
 
 /// How far outside of its rectangle a caster may be met, in raster units: vertices and receivers below the guard are
@@ -404,7 +410,7 @@ fn draw_impl<S: Simd>(
     tile: &mut ReceiverTile,
     record: &EdgeRecord,
     area: &CasterArea,
-    parts: Parts,
+    points: Points,
 ) {
     let side = (area.max[0] - area.min[0]).min(area.max[1] - area.min[1]);
     let how = (largest_at(record), side >= tile.mean_side);
@@ -423,7 +429,7 @@ fn draw_impl<S: Simd>(
         let below = at[level] * LANES + left[level].trailing_zeros() as usize;
         left[level] &= left[level] - 1;
         if level == 0 {
-            draw_on_entry(simd, tile, record, below, parts);
+            draw_on_entry(simd, tile, record, below, points);
         } else {
             level -= 1;
             at[level] = below;
@@ -552,10 +558,16 @@ fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Si
 
 /// Holds a caster against the receivers of one entry.
 #[inline(always)]
-fn draw_on_entry<S: Simd>(simd: S, tile: &mut ReceiverTile, record: &EdgeRecord, index: usize, parts: Parts) {
+fn draw_on_entry<S: Simd>(
+    simd: S,
+    tile: &mut ReceiverTile,
+    record: &EdgeRecord,
+    index: usize,
+    points: Points,
+) {
     let held = &mut tile.held[index];
     held.tested = true;
-    let (candidates, sure) = cover(simd, held.points(parts), record);
+    let (candidates, sure) = cover(simd, held.points(points), points, record);
     let open = u32::from(held.open);
     let mut unsure = candidates & !sure & open;
     held.open &= !(sure as u16);
@@ -572,20 +584,24 @@ fn draw_on_entry<S: Simd>(simd: S, tile: &mut ReceiverTile, record: &EdgeRecord,
 /// The receivers of a block that a caster may shadow, and those among them that it certainly shadows; not those that
 /// lie on it.
 #[inline(always)]
-fn cover<S: Simd>(simd: S, points: &BlockPoints, record: &EdgeRecord) -> (u32, u32) {
-    let x = f32x16::from_slice(simd, &points.x);
-    let y = f32x16::from_slice(simd, &points.y);
+fn cover<S: Simd>(simd: S, block: &BlockPoints, points: Points, record: &EdgeRecord) -> (u32, u32) {
+    let x = f32x16::from_slice(simd, &block.x);
+    let y = f32x16::from_slice(simd, &block.y);
     let EdgeRecord { a, b, c, .. } = *record;
     let inside = plane(simd, [a[0], b[0], c[0]], x, y)
         .min(plane(simd, [a[1], b[1], c[1]], x, y))
         .min(plane(simd, [a[2], b[2], c[2]], x, y));
     let covered = inside.simd_ge(f32x16::splat(simd, -1.0));
-    let own = u32x16::from_slice(simd, &points.prims).simd_eq(u32x16::splat(simd, record.prim));
+    if covered.all_false() {
+        return (0, 0);
+    }
+    let seen = &points.tiles[block.eye_tile as usize].prims[block.block as usize];
+    let own = u32x16::from_slice(simd, seen).simd_eq(u32x16::splat(simd, record.prim));
     let covered = covered & !own;
     if covered.all_false() {
         return (0, 0);
     }
-    let nearness = f32x16::from_slice(simd, &points.nearness);
+    let nearness = f32x16::from_slice(simd, &block.nearness);
     let slopes = [record.nearness_x, record.nearness_y, record.nearness];
     let n = plane(simd, slopes, x, y);
     let (floor, ceiling) = (

@@ -27,6 +27,7 @@ use rayon::prelude::*;
 
 use crate::kernel::SimdLevel;
 use crate::kernel::pixels::{BlockPoints, LIGHT_TILE};
+use crate::kernel::receivers::Points;
 use crate::light_grid::takes_part;
 use crate::view::View;
 use crate::visibility::place;
@@ -137,6 +138,10 @@ impl LitPixels {
         gather::gather(visibility, triangles, query, (&faces, light_tiles), level, parts);
         let parts: &[Part] = parts;
         let points: Vec<&[BlockPoints]> = parts.iter().map(|part| &part.points[..]).collect();
+        let points = Points {
+            parts: &points,
+            tiles: visibility.tiles(),
+        };
         let lit: Vec<Vec<AtomicU16>> = parts
             .iter()
             .flat_map(|part| &part.asked)
@@ -155,7 +160,7 @@ impl LitPixels {
                 triangles,
                 query,
                 parts,
-                points: &points,
+                points,
                 lit: &lit,
                 view: &faces.views[face],
                 face: face as u32,
@@ -253,7 +258,7 @@ struct FaceScene<'f> {
     query: &'f LightQuery<'f>,
     parts: &'f [Part],
     /// Points of the parts.
-    points: &'f [&'f [BlockPoints]],
+    points: Points<'f>,
     /// Of each of the eye's tiles the pixels that no caster was found for yet.
     lit: &'f [Vec<AtomicU16>],
     view: &'f View,
