@@ -6,15 +6,16 @@
 //! eye's are over pixels. Nothing is kept of a caster, and a triangle costs little where nobody asks:
 //! beside all receivers, or behind the farthest of them.
 //!
-//! Steps: surface points of each of the eye's tiles in lanes, into light tiles ([`gather`]); vertices projected and triangles sorted
-//! into the light tiles that have receivers ([`crate::bins`]); each light tile by itself ([`light_tile`]). All are
+//! Steps: surface points of each of the eye's tiles in lanes, block by block into light tiles ([`gather`]); casters that may
+//! come before somebody into light tiles, from clusters ([`casters`]); each light tile by itself ([`light_tile`]). All are
 //! parallel, and their results do not depend on the order in which parts are done.
 //!
 //! A pixel whose triangle turns another side to the light than to the eye gets no light, without a ray.
 //!
-//! Layout, while one light is done: 12 to 24 bytes a pixel that asks, 16 bytes a block of them and light tile, 16 bytes a vertex and 4 bytes
-//! a reference of one face. What is left is a bit a pixel. Limits: perspective eyes in lanes, others pixel by
-//! pixel; where coordinates pass 1e30 every caster is tested for every pixel.
+//! Layout, while one light is done: 12.5 to 25 bytes a pixel of blocks that ask, 44 bytes a block and light tile, 12 bytes
+//! a vertex and cluster, 40 bytes a caster and 12 bytes a reference of one face; kept in [`LitScratch`]. What is left
+//! is a bit a pixel. Limits: perspective eyes in lanes, others pixel by pixel; where coordinates pass 1e30 every caster is
+//! tested for every pixel.
 
 mod asked;
 mod casters;
