@@ -80,7 +80,7 @@ pub use perspective_grids::PerspectiveGrids;
 pub use queries::Candidates;
 pub use ray::{Hit, Light, Ray, Receiver};
 pub use receiver_grid::{LightQuery, LitCounts, LitPixels, LitScratch};
-pub use samples::{MAX_SAMPLES, Samples};
+pub use samples::{MAX_SAMPLES, Samples, sequence_point};
 pub use surface_ray::SurfaceRay;
 pub use topology::Topology;
 pub use triangles::Triangles;

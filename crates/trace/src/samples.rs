@@ -49,6 +49,19 @@ impl Samples {
     }
 }
 
+/// Point `index` of the sequence that three numbers name, each coordinate in \[0, 1) and a multiple of 2^-24. Sequences are
+/// shuffled as well as scrambled, so that points with equal index in two of them know nothing of each other: any pair of
+/// dimensions may have one of its own. Each 2^m points from a multiple of 2^m on are spread as those of [`Samples`].
+pub fn sequence_point(of: [u32; 3], index: u32) -> [f32; 2] {
+    let [a, b, c] = of;
+    let seed = hash(hash(a ^ hash(b)) ^ c.wrapping_mul(DIMENSION));
+    let shuffled = scrambled(index.reverse_bits(), seed);
+    [
+        unit(scrambled(shuffled, hash(seed ^ 1))),
+        unit(scrambled(second(shuffled), hash(seed ^ 2))),
+    ]
+}
+
 /// Multipliers of [`hash`].
 pub(crate) const HASH: [u32; 2] = [0x7feb_352d, 0x846c_a68b];
 
