@@ -6,7 +6,7 @@
 //! component as often as it enters it.
 
 use glam::DVec3;
-use rayward_scene::{AlphaMode, FrameGeometry, Scene};
+use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene};
 use rayward_trace::{AreaLight, Casts, Light, Topology};
 
 use crate::CasterPolicy;
@@ -125,9 +125,12 @@ impl<'t> CasterRules<'t> {
     }
 }
 
-/// Per triangle, whether its material is masked or blended; empty if none is.
+/// Per triangle, whether its material is masked, blended or a thin wall that transmits; empty if none is.
 pub(crate) fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
-    let transparent = |material: u32| scene.materials[material as usize].alpha_mode != AlphaMode::Opaque;
+    let transparent = |material: u32| {
+        let material = &scene.materials[material as usize];
+        material.alpha_mode != AlphaMode::Opaque || is_thin_glass(material)
+    };
     if !geometry.objects.iter().any(|o| transparent(o.material)) {
         return Vec::new();
     }
@@ -135,4 +138,9 @@ pub(crate) fn transparent_triangles(scene: &Scene, geometry: &FrameGeometry) -> 
     objects
         .flat_map(|o| std::iter::repeat_n(transparent(o.material), o.triangles.len()))
         .collect()
+}
+
+/// Whether light goes straight through a material: volumes bend it.
+pub(crate) fn is_thin_glass(material: &Material) -> bool {
+    material.transmission > 0.0 && material.thickness <= 0.0 && material.metallic < 1.0
 }

@@ -10,7 +10,8 @@
 //! Radiance is interpolated linearly between texels, around the seam too. As a light it is sampled by importance:
 //! a row by its share of the light, then a column in the row (Pharr, Jakob and Humphreys, *Physically Based
 //! Rendering*, 4th edition, §A.5.1: piecewise constant 2-D distributions). The distribution is that of the largest
-//! texel around each place, so that it is above 0 wherever the interpolated radiance is: estimates have no bias.
+//! texel around each place, so that it is above 0 wherever the interpolated radiance is: estimates have no bias. Half
+//! of it follows the light, half the root of the light, so that the sky is drawn where the sun is hidden, too.
 //! Maps larger than [`MAX_DISTRIBUTION`] are reduced for it, not for what is seen.
 //!
 //! Units: nits a unit of the file times the intensity. Cost: 12 bytes a texel and 4 bytes a texel of the
@@ -177,14 +178,26 @@ impl Distribution {
                 .map(|i| f64::from(luminance(texels[i])))
                 .fold(0.0, f64::max)
         };
-        let lines: Vec<(f64, Vec<f32>)> = (0..cells_y)
+        let area = |y: usize| ((y as f64 + 0.5) / cells_y as f64 * std::f64::consts::PI).sin();
+        let cells: Vec<Vec<f64>> = (0..cells_y)
             .into_par_iter()
-            .map(|y| {
-                let area = ((y as f64 + 0.5) / cells_y as f64 * std::f64::consts::PI).sin();
-                let (sum, line) = cumulative((0..cells_x).map(|x| brightest(x, y)));
-                (sum * area, line)
-            })
+            .map(|y| (0..cells_x).map(|x| brightest(x, y)).collect())
             .collect();
+        let total = |of: fn(f64) -> f64| -> f64 {
+            let line = |(y, cells): (usize, &Vec<f64>)| area(y) * cells.iter().map(|&l| of(l)).sum::<f64>();
+            cells
+                .iter()
+                .enumerate()
+                .map(line)
+                .sum::<f64>()
+                .max(f64::MIN_POSITIVE)
+        };
+        let (light, root) = (total(|l| l), total(f64::sqrt));
+        let lines = cells.iter().enumerate().map(|(y, cells)| {
+            let (sum, line) = cumulative(cells.iter().map(|&l| l / light + l.sqrt() / root));
+            (sum * area(y), line)
+        });
+        let lines: Vec<(f64, Vec<f32>)> = lines.collect();
         let (sum, rows) = cumulative(lines.iter().map(|line| line.0));
         (sum > 0.0).then(|| Self {
             width: cells_x,

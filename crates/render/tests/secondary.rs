@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DVec3, Vec3, Vec4};
 use rayward::scene::{FrameGeometry, LightKind, Material, PosedCamera, PosedLight, Scene, builtin};
 use rayward::trace::SimdLevel;
-use rayward::{Environment, Film, Picture, RenderOptions, Renderer};
+use rayward::{Environment, Film, Picture, RenderOptions, Renderer, Shader};
 
 /// A sky of one radiance, or one that is bright in a corner.
 fn sky(texel: impl Fn(u32, u32) -> Vec3) -> Environment {
@@ -192,6 +192,32 @@ fn mirrors_and_clear_glass_vanish_in_an_even_sky() {
         // What is left out: rays of less than a 4096th of a pixel.
         assert!(off_by(&film) < 0.02, "{}", off_by(&film));
     }
+}
+
+#[test]
+fn light_goes_straight_through_thin_walls_in_their_colour() {
+    let passed = |material: Material| {
+        let scene = all_of(material);
+        let geometry = scene.at(0.0);
+        Shader::new(&scene).transmittance(&geometry, 0, 0, [0.3, 0.3], false)
+    };
+    let pane = Material {
+        transmission: 0.5,
+        base_color: Vec4::new(1.0, 0.5, 0.25, 1.0),
+        ..Material::default()
+    };
+    let expected = Vec3::new(1.0, 0.5, 0.25) * 0.5 * 0.96;
+    assert!((passed(pane.clone()) - expected).abs().max_element() < 1e-6);
+    let volume = Material {
+        thickness: 1.0,
+        ..pane.clone()
+    };
+    assert_eq!(passed(volume), Vec3::ZERO, "volumes bend light");
+    let metal = Material {
+        metallic: 1.0,
+        ..pane
+    };
+    assert_eq!(passed(metal), Vec3::ZERO);
 }
 
 #[test]

@@ -12,8 +12,9 @@
 //! ```
 //!
 //! Limits: a volume inside of another one ends the outer one. Reflections rougher than [`GLOSSY`] see the
-//! environment but no surfaces unless diffuse light is traced, too. Lights do not shine through boundaries of
-//! volumes, which cast shadows like all else: such light is found only by diffuse rays that meet the glass.
+//! environment but no surfaces unless diffuse light is traced, too. Lights shine straight through thin
+//! walls, but not through boundaries of volumes, which cast shadows like all else: such light is found only by diffuse
+//! rays that meet the glass.
 
 mod light;
 

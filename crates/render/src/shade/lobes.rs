@@ -9,8 +9,8 @@
 //!
 //! Below [`SMOOTH`] of roughness a lobe is one direction: no random number changes it, and its density is infinite.
 //!
-//! Limits: rough glass passes what its rays meet, but not the light of points and directions; radiance is not
-//! scaled inside of a volume, which shows only where the camera or a light is in one.
+//! Limits: rough glass passes what its rays meet, but shows no highlights of points and directions behind it; radiance
+//! is not scaled inside of a volume, which shows only where the camera or a light is in one.
 
 use std::f32::consts::{FRAC_1_PI, TAU};
 

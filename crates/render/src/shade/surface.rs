@@ -12,6 +12,7 @@ use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
 
+use crate::casters::is_thin_glass;
 use crate::texture::{Encoding, Texture, Textures};
 
 /// A point on a surface of the frame, as seen from somewhere.
@@ -124,6 +125,7 @@ struct ShaderMaterial {
     transmission: f32,
     ior: f32,
     thin: bool,
+    thin_glass: bool,
     absorption: Vec3,
     normal_scale: f32,
     occlusion_strength: f32,
@@ -182,6 +184,7 @@ impl ShaderMaterial {
             transmission: material.transmission,
             ior: material.ior,
             thin: material.thickness <= 0.0,
+            thin_glass: is_thin_glass(material),
             absorption: absorption(material),
             normal_scale: material.normal_scale,
             occlusion_strength: material.occlusion_strength,
@@ -197,6 +200,21 @@ impl ShaderMaterial {
             specular_color_texture: resolved[6],
             transmission_texture: resolved[7],
         }
+    }
+
+    fn is_opaque(&self) -> bool {
+        self.alpha_mode == AlphaMode::Opaque && !self.thin_glass
+    }
+
+    /// Share of light that goes straight through what is covered, but for its colour.
+    fn passed(&self, lookup: &Lookup) -> f32 {
+        if !self.thin_glass {
+            return 0.0;
+        }
+        let texel = |texture| lookup.get(texture).unwrap_or(Vec4::ONE);
+        let metallic = (self.metallic * texel(&self.metallic_roughness_texture).z).clamp(0.0, 1.0);
+        let through = self.transmission * texel(&self.transmission_texture).x;
+        through * (1.0 - metallic) * (1.0 - self.ior_reflectance * self.specular).max(0.0)
     }
 
     fn coverage(&self, alpha: f32) -> f32 {
@@ -306,6 +324,7 @@ impl<'s> Shader<'s> {
     /// Share of light that a surface lets through at a point: what the alpha of [`Self::surface`] leaves, for a
     /// fraction of its cost. Textures are not filtered.
     ///
+    /// A thin wall passes light straight on in its colour, by what its reflection leaves head on.
     /// `tinted` light takes on the colour of blended surfaces as far as they cover: `(1 - a) (1 - a + a c)` for
     /// coverage `a` and base colour `c`.
     pub fn transmittance(
@@ -317,7 +336,7 @@ impl<'s> Shader<'s> {
         tinted: bool,
     ) -> Vec3 {
         let material = self.material(geometry, object);
-        if material.alpha_mode == AlphaMode::Opaque {
+        if material.is_opaque() {
             return Vec3::ZERO;
         }
         let corners = Corners::new(geometry, prim, u, v);
@@ -325,16 +344,18 @@ impl<'s> Shader<'s> {
         let base = base_color(geometry, &corners, material, &lookup);
         let covered = material.coverage(base.w);
         let left = Vec3::splat(1.0 - covered);
-        if tinted && material.alpha_mode == AlphaMode::Blend {
-            left * (left + base.xyz().clamp(Vec3::ZERO, Vec3::ONE) * covered)
+        let color = base.xyz().clamp(Vec3::ZERO, Vec3::ONE);
+        let past = if tinted && material.alpha_mode == AlphaMode::Blend {
+            left * (left + color * covered)
         } else {
             left
-        }
+        };
+        past + color * (covered * material.passed(&lookup))
     }
 
-    /// Whether an object's material covers all it is seen through, whatever its alpha.
+    /// Whether an object's material lets no light through straight.
     pub fn is_opaque(&self, geometry: &FrameGeometry, object: u32) -> bool {
-        self.material(geometry, object).alpha_mode == AlphaMode::Opaque
+        self.material(geometry, object).is_opaque()
     }
 
     /// The surface at a point.
