@@ -336,7 +336,8 @@ mod tests {
         // Rounding carries a few across the border of a cell.
         assert!(elsewhere < N * N / 500, "{elsewhere}");
         assert!((all - 1.0).abs() < 2e-3, "{all}");
-        assert!((estimate / exact - 1.0).abs() < 2e-3, "{estimate} {exact}");
+        // Squares of random numbers, unlike those of the image, have borders of texels within.
+        assert!((estimate / exact - 1.0).abs() < 5e-3, "{estimate} {exact}");
     }
 
     #[test]
