@@ -170,9 +170,11 @@ impl PreciseTriangle {
     /// Raster rectangle (min, max) that holds all of the triangle that the view sees; `None` if nothing.
     ///
     /// The part inside the view's pyramid is cut out in homogeneous coordinates, so that no division by a depth
-    /// near zero occurs unless the triangle passes through the center itself.
+    /// near zero occurs unless the triangle passes through the center itself. Cuts leave as much more as rounding of
+    /// the largest coordinate may take away.
     pub(crate) fn bounds(&self, view: &View) -> Option<[[f64; 2]; 2]> {
         let (width, height) = (f64::from(view.width), f64::from(view.height));
+        let whole = Some([[0.0, 0.0], [width, height]]);
         let [ox, oy] = self.origin;
         let planes = [
             DVec3::new(1.0, 0.0, ox),
@@ -180,9 +182,15 @@ impl PreciseTriangle {
             DVec3::new(-1.0, 0.0, width - ox),
             DVec3::new(0.0, -1.0, height - oy),
         ];
+        let size = self
+            .points
+            .iter()
+            .map(|p| p.abs().element_sum())
+            .fold(0.0, f64::max);
+        let rounding = size * 2f64.powi(-49);
         let mut polygon: Vec<DVec3> = self.points.to_vec();
         for plane in planes {
-            polygon = clip(&polygon, plane);
+            polygon = clip(&polygon, plane, rounding * 2.0 * plane.abs().element_sum());
             if polygon.is_empty() {
                 return None;
             }
@@ -190,12 +198,14 @@ impl PreciseTriangle {
         let (mut min, mut max) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for p in polygon {
             // Inside the pyramid only its tip has no depth; there the triangle may cover everything.
-            let [x, y] = [p.x / p.z + ox, p.y / p.z + oy];
-            if !(x.is_finite() && y.is_finite()) {
-                return Some([[0.0, 0.0], [width, height]]);
+            let [x, y] = [p.x / p.z, p.y / p.z];
+            let errors = [x, y].map(|v| rounding * (1.0 + v.abs()) / (p.z - rounding));
+            if !(p.z > 2.0 * rounding && errors.iter().all(|error| error.is_finite())) {
+                return whole;
             }
-            min = [min[0].min(x), min[1].min(y)];
-            max = [max[0].max(x), max[1].max(y)];
+            let [x, y] = [x + ox, y + oy];
+            min = [min[0].min(x - errors[0]), min[1].min(y - errors[1])];
+            max = [max[0].max(x + errors[0]), max[1].max(y + errors[1])];
         }
         let slack = (width + height) * 1e-7;
         Some([min.map(|v| v - slack), max.map(|v| v + slack)])
@@ -266,12 +276,12 @@ fn orientation(view: &View, corners: [Vec3; 3]) -> f64 {
     }
 }
 
-/// The part of a convex polygon where `plane . p >= 0` (Sutherland and Hodgman).
-fn clip(polygon: &[DVec3], plane: DVec3) -> Vec<DVec3> {
+/// The part of a convex polygon where `plane . p >= -slack` (Sutherland and Hodgman).
+fn clip(polygon: &[DVec3], plane: DVec3, slack: f64) -> Vec<DVec3> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (i, &p) in polygon.iter().enumerate() {
         let q = polygon[(i + 1) % polygon.len()];
-        let (dp, dq) = (plane.dot(p), plane.dot(q));
+        let (dp, dq) = (plane.dot(p) + slack, plane.dot(q) + slack);
         if dp >= 0.0 {
             kept.push(p);
         }

@@ -347,3 +347,22 @@ fn blocks_show_what_pixels_do() {
         }
     }
 }
+#[test]
+fn equals_brute_force_with_a_triangle_of_any_size_in_view() {
+    let size = [70, 45];
+    for huge in [1e12, 1e19, 1e25, 1e30, 1e33, 1e38] {
+        let mut mesh = Mesh::soup(6, 60, 0.3, 1.0);
+        mesh.triangle([
+            Vec3::new(-huge, -0.4 * huge, -huge),
+            Vec3::new(huge, -0.5 * huge, -huge),
+            Vec3::new(0.1 * huge, huge, -0.9 * huge),
+        ]);
+        mesh.triangle([
+            Vec3::new(-huge, -1.0, huge),
+            Vec3::new(huge, -1.0, huge),
+            Vec3::new(0.0, -1.1, -huge),
+        ]);
+        let view = looking(Vec3::new(0.2, 0.5, 2.5), Vec3::ZERO, 0.5, size);
+        check(&format!("huge {huge:e}"), &mesh, view);
+    }
+}
