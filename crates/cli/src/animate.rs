@@ -20,7 +20,7 @@ use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
 use crate::progress::Bar;
-use crate::render::{check_memory, environment, options};
+use crate::render::{check_memory, environment, lens, options, picture};
 use crate::report::{self, count, duration, milliseconds};
 use crate::values::{Shard, Span};
 use crate::view::View;
@@ -130,32 +130,51 @@ impl Job<'_> {
         bar: &Bar,
         write: impl FnOnce(&RenderedFrame) -> Result<Vec<PathBuf>, Failure>,
     ) -> Result<(), Failure> {
-        let (args, options) = (self.args, &self.options);
-        let time = f64::from(frame) / args.frames.rate;
+        let args = self.args;
         let pose = Instant::now();
-        let geometry = &mut self.geometry;
-        self.input
-            .scene
-            .at_animation(Some(self.animation), time as f32, geometry);
+        let mut geometry = std::mem::take(&mut self.geometry);
+        let view = self.pose(f64::from(frame), &mut geometry)?;
+        let close = |seconds: f64| {
+            let mut close = FrameGeometry::default();
+            let frame = f64::from(frame) + seconds * args.frames.rate;
+            let camera = self.pose(frame, &mut close)?.camera;
+            Ok::<_, Failure>((close, camera))
+        };
+        let closed = args.picture.shutter.map(close).transpose()?;
         let pose_ms = milliseconds(pose.elapsed());
-        let aspect = f64::from(options.width) / f64::from(options.height);
-        let mut view = View::choose(&args.view, self.input, geometry, aspect)?;
-        if let Some(degrees) = args.frames.turn {
-            let share = f64::from(frame - self.frames.start) / f64::from(self.frames.end - self.frames.start);
-            turn(&mut view.camera, geometry, (degrees * share).to_radians());
-        }
-        let rendered = self
-            .renderer
-            .render(geometry, &view.camera, &view.lights, options, &|_| ())?;
+        let options = RenderOptions {
+            lens: lens(&args.picture, &view.camera, &geometry),
+            ..self.options
+        };
+        let seen = (&geometry, &view);
+        let rendered = picture(&mut self.renderer, seen, closed.as_ref(), &options, &|_| ())?;
+        self.geometry = geometry;
         let writing = Instant::now();
         let files = write(&rendered)?;
         bar.next_frame();
         if args.run.json {
             let write_ms = milliseconds(writing.elapsed());
+            let time = f64::from(frame) / args.frames.rate;
             let report = FrameReport::new(frame, time, &files, &rendered.stats, pose_ms, write_ms);
             report::to_stdout_json_line(&report)?;
         }
         Ok(())
+    }
+
+    /// Poses a frame, or a moment between two, and its view.
+    fn pose(&self, frame: f64, geometry: &mut FrameGeometry) -> Result<View, Failure> {
+        let (args, frames) = (self.args, self.frames);
+        let time = (frame / args.frames.rate) as f32;
+        self.input
+            .scene
+            .at_animation(Some(self.animation), time, geometry);
+        let aspect = f64::from(self.options.width) / f64::from(self.options.height);
+        let mut view = View::choose(&args.view, self.input, geometry, aspect)?;
+        if let Some(degrees) = args.frames.turn {
+            let share = (frame - f64::from(frames.start)) / f64::from(frames.end - frames.start);
+            turn(&mut view.camera, geometry, (degrees * share).to_radians());
+        }
+        Ok(view)
     }
 
     /// Renders all frames into one file.

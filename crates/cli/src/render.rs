@@ -40,16 +40,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let pose_start = Instant::now();
     let frame = input.pose(&args.moment)?;
     let pose = pose_start.elapsed();
-    if frame.triangle_count() == 0 {
-        let (broken, flat) = (frame.dropped_non_finite, frame.dropped_degenerate);
-        return Err(Failure::new(
-            Code::Input,
-            format_args!(
-                "{}: no triangles are left: {broken} not finite, {flat} without area",
-                input.path.display()
-            ),
-        ));
-    }
+    check_triangles(&input, &frame)?;
     let aspect = f64::from(options.width) / f64::from(options.height);
     let view = View::choose(&args.view, &input, &frame, aspect)?;
 
@@ -65,7 +56,13 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         lens: lens(&args.picture, &view.camera, &frame),
         ..options
     };
-    let rendered = picture(args, &input, &mut renderer, (&frame, &view), &options, &show)?;
+    let close = |seconds| {
+        let close = input.pose(&args.moment.after(seconds))?;
+        let camera = View::choose(&args.view, &input, &close, aspect)?.camera;
+        Ok::<_, Failure>((close, camera))
+    };
+    let closed = args.picture.shutter.map(close).transpose()?;
+    let rendered = picture(&mut renderer, (&frame, &view), closed.as_ref(), &options, &show)?;
     device.close(args.run.quiet)?;
     bar.phase("writing");
     let write_start = Instant::now();
@@ -100,25 +97,33 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     }
 }
 
-/// The picture of a frame, with what has moved when the shutter closes if there is one.
-fn picture(
-    args: &RenderArgs,
-    input: &Input,
+/// A scene that only lost triangles is no empty scene.
+fn check_triangles(input: &Input, frame: &FrameGeometry) -> Result<(), Failure> {
+    if frame.triangle_count() > 0 {
+        return Ok(());
+    }
+    let (broken, flat) = (frame.dropped_non_finite, frame.dropped_degenerate);
+    Err(Failure::new(
+        Code::Input,
+        format_args!(
+            "{}: no triangles are left: {broken} not finite, {flat} without area",
+            input.path.display()
+        ),
+    ))
+}
+
+/// The picture of a frame; `closed` is what is seen when the shutter closes, if there is one.
+pub(crate) fn picture(
     renderer: &mut Renderer,
     (frame, view): (&FrameGeometry, &View),
+    closed: Option<&(FrameGeometry, PosedCamera)>,
     options: &RenderOptions,
     show: &(dyn Fn(Progress) + Sync),
 ) -> Result<RenderedFrame, Failure> {
-    let Some(seconds) = args.picture.shutter else {
+    let Some((geometry, camera)) = closed else {
         return Ok(renderer.render(frame, &view.camera, &view.lights, options, show)?);
     };
-    let close = input.pose(&args.moment.after(seconds))?;
-    let aspect = f64::from(options.width) / f64::from(options.height);
-    let camera = View::choose(&args.view, input, &close, aspect)?.camera;
-    let shutter = Shutter {
-        geometry: &close,
-        camera: &camera,
-    };
+    let shutter = Shutter { geometry, camera };
     Ok(renderer.render_shutter(frame, &view.camera, shutter, &view.lights, options, show)?)
 }
 
@@ -154,7 +159,7 @@ pub(crate) fn environment(args: &ViewArgs) -> Result<Option<Environment>, Failur
 }
 
 /// The lens asked for, focused on the middle of the scene if on nothing else.
-fn lens(args: &PictureArgs, camera: &PosedCamera, frame: &FrameGeometry) -> Option<Lens> {
+pub(crate) fn lens(args: &PictureArgs, camera: &PosedCamera, frame: &FrameGeometry) -> Option<Lens> {
     let middle = || (input::center(frame) - camera.eye).dot(camera.forward);
     args.aperture.map(|diameter| Lens {
         radius: 0.5 * diameter,

@@ -36,6 +36,27 @@ fn frames_are_those_of_render() {
 }
 
 #[test]
+fn lens_and_shutter_are_those_of_render() {
+    let folder = Folder::new();
+    let blurred = ["--aperture", "0.4", "--shutter", "0.1", "--pixel-samples", "4"];
+    animate(
+        &folder,
+        &[&["--rate", "4", "--frames", "1..2"][..], &blurred].concat(),
+    )
+    .expect(0);
+    let moment = ["--resolution", "24x16", "-q", "--time", "0.25"];
+    let render = [&["render", "--builtin", "walker"][..], &moment];
+    let render = |more: &[&str], name| {
+        folder
+            .run(&[&render.concat()[..], more, &["-o", name]].concat())
+            .expect(0);
+        bytes(&folder, name)
+    };
+    assert!(render(&blurred, "blurred.png") == bytes(&folder, "frame-0001.png"));
+    assert!(render(&[], "sharp.png") != bytes(&folder, "frame-0001.png"));
+}
+
+#[test]
 fn shards_and_a_resumed_run_give_the_frames_of_the_whole() {
     let (whole, parts) = (Folder::new(), Folder::new());
     let frames = ["--rate", "6", "--turn", "90", "-o", "f#.png"];
