@@ -92,21 +92,26 @@ impl Bundles {
         let most = splat((nearest - self.farthest).max(0.0) * 1.00001);
         let least = splat((farthest - self.nearest).max(0.0) * 0.99999);
         let slopes = &self.slopes[eight];
-        let low = |slope: &[f32; WIDTH], from: f32| {
-            let slope = f32x8::from_slice(simd, slope);
-            splat(from) + (slope * most).min(slope * least)
-        };
-        let high = |slope: &[f32; WIDTH], from: f32| {
-            let slope = f32x8::from_slice(simd, slope);
-            splat(from) + (slope * most).max(slope * least)
-        };
         let Bounds { x, y, .. } = self.bounds;
-        let apart = low(&slopes.x[0], x[0]).simd_gt(splat(x1))
-            | high(&slopes.x[1], x[1]).simd_lt(splat(x0))
-            | low(&slopes.y[0], y[0]).simd_gt(splat(y1))
-            | high(&slopes.y[1], y[1]).simd_lt(splat(y0));
+        let lengths = [most, least];
+        let left = splat(x[0]) + drift(simd, &slopes.x[0], lengths)[0];
+        let right = splat(x[1]) + drift(simd, &slopes.x[1], lengths)[1];
+        let top = splat(y[0]) + drift(simd, &slopes.y[0], lengths)[0];
+        let bottom = splat(y[1]) + drift(simd, &slopes.y[1], lengths)[1];
+        let apart = left.simd_gt(splat(x1))
+            | right.simd_lt(splat(x0))
+            | top.simd_gt(splat(y1))
+            | bottom.simd_lt(splat(y0));
         !(apart.to_bitmask() as u32) & 0xff
     }
+}
+
+/// How far rays of these slopes go aside over two lengths, the smaller value first.
+#[inline(always)]
+fn drift<S: Simd>(simd: S, slope: &[f32; WIDTH], [most, least]: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
+    let slope = f32x8::from_slice(simd, slope);
+    let (a, b) = (slope * most, slope * least);
+    [a.min(b), a.max(b)]
 }
 
 /// Smallest and largest slopes along x and y of the rays to the samples `d`, in perspective.

@@ -435,6 +435,27 @@ impl Culled {
     }
 }
 
+/// How far the box of these half axes reaches along a direction.
+#[inline(always)]
+fn over<S: Simd>(simd: S, axes: &[[f32; 3]; 3], v: [f32x16<S>; 3]) -> f32x16<S> {
+    dot(simd, v, axes[0]).abs() + dot(simd, v, axes[1]).abs() + dot(simd, v, axes[2]).abs()
+}
+
+/// One coordinate, of axes `a` and `b`, of the cross product of `e` and `p`, and `add`.
+#[inline(always)]
+fn minor<S: Simd>(e: [f32x16<S>; 3], p: [f32x16<S>; 3], [a, b]: [usize; 2], add: f32x16<S>) -> f32x16<S> {
+    e[a].mul_add(p[b], add) - e[b] * p[a]
+}
+
+#[inline(always)]
+fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> [f32x16<S>; 3] {
+    [
+        f32x16::splat(simd, v[0]),
+        f32x16::splat(simd, v[1]),
+        f32x16::splat(simd, v[2]),
+    ]
+}
+
 /// Sorts out the triangles `candidates` of a group.
 #[inline(always)]
 pub(crate) fn culled<S: Simd>(
@@ -446,35 +467,39 @@ pub(crate) fn culled<S: Simd>(
 ) -> Culled {
     let splat = |v: f32| f32x16::splat(simd, v);
     let (p, h, axes) = (receivers.middle, receivers.half, &receivers.axes);
-    let over = |v: [f32x16<S>; 3]| {
-        dot(simd, v, axes[0]).abs() + dot(simd, v, axes[1]).abs() + dot(simd, v, axes[2]).abs()
-    };
     let normal = load3(simd, &group.normal);
     let plane = dot(simd, normal, p) - f32x16::from_slice(simd, &group.height);
-    let thickness = over(normal);
+    let thickness = over(simd, axes, normal);
     // The box has rounding errors of its own.
-    let slack = |error: f32| splat(error * 2.0);
-    let behind = !(plane - thickness).simd_gt(slack(receivers.plane_error));
+    let plane_slack = splat(receivers.plane_error * 2.0);
+    let behind = !(plane - thickness).simd_gt(plane_slack);
     let mut kept = behind.to_bitmask() as u32 & candidates;
     if kept == 0 {
         return Culled::default();
     }
-    let between = (plane + thickness).simd_lt(-slack(receivers.plane_error));
-    let slack = slack(receivers.edge_error);
+    let between = (plane + thickness).simd_lt(-plane_slack);
+    let slack = splat(receivers.edge_error * 2.0);
     let mut least_middle = splat(f32::INFINITY);
     let mut cut = [0; 3];
     for (i, cut) in cut.iter_mut().enumerate() {
         let (m, e) = (load3(simd, &group.m[i]), load3(simd, &group.e[i]));
-        let cross = |a: usize, b: usize, add: f32x16<S>| e[a].mul_add(splat(p[b]), add) - e[b] * splat(p[a]);
-        let gradient = [cross(1, 2, m[0]), cross(2, 0, m[1]), cross(0, 1, m[2])];
+        let (at, half) = (splat3(simd, p), splat3(simd, h));
+        let gradient = [
+            minor(e, at, [1, 2], m[0]),
+            minor(e, at, [2, 0], m[1]),
+            minor(e, at, [0, 1], m[2]),
+        ];
         let sizes = abs3(e);
-        let spread = |a: usize, b: usize| sizes[a] * splat(h[b]) + sizes[b] * splat(h[a]);
-        let spreads = [spread(1, 2), spread(2, 0), spread(0, 1)];
+        let spreads = [
+            sizes[1] * half[2] + sizes[2] * half[1],
+            sizes[2] * half[0] + sizes[0] * half[2],
+            sizes[0] * half[1] + sizes[1] * half[0],
+        ];
         let mut middle = dot(simd, gradient, light.middle);
         let mut spread = dot(simd, abs3(gradient), light.half) + dot(simd, spreads, light.reach);
         if light.weight != 0.0 {
             middle -= dot(simd, m, p);
-            spread += over(m);
+            spread += over(simd, axes, m);
         }
         kept &= !((middle + spread).simd_lt(-slack).to_bitmask() as u32);
         if kept == 0 {
