@@ -114,7 +114,7 @@ impl BenchScene {
         lights.extend(geometry.lights.iter().cloned());
         lights.extend(scene::default_lights(&camera));
         let rectangle = |light: &&PosedLight| matches!(light.kind, LightKind::Rectangle { .. });
-        let square = square_at(&lights[0], &geometry);
+        let square = scene::square_light_at(&lights[0], &geometry);
         let area = posed_area(&geometry, lights.iter().find(rectangle).unwrap_or(&square));
         let area = area.ok_or(Error::Scene {
             name: name.into(),
@@ -204,23 +204,6 @@ impl BenchScene {
 fn posed_area(geometry: &FrameGeometry, light: &PosedLight) -> Option<AreaLight> {
     let plan = FramePlan::new(geometry, std::slice::from_ref(light), &RenderOptions::default());
     plan.lights[0].as_ref()?.area
-}
-
-/// A square in the place of a light, a tenth of its distance wide, that faces the middle of the scene.
-fn square_at(light: &PosedLight, geometry: &FrameGeometry) -> PosedLight {
-    let (low, high) = geometry.bounds().unwrap_or_default();
-    let middle = geometry.origin + (low + high).as_dvec3() * 0.5;
-    let position = match light.kind {
-        LightKind::Directional { .. } => middle - light.direction * f64::from((high - low).length()),
-        _ => light.position,
-    };
-    let mut square = scene::point_light_for(position, middle);
-    let side = (position.distance(middle) * 0.1) as f32;
-    square.kind = LightKind::Rectangle {
-        width: side,
-        height: side,
-    };
-    square
 }
 
 fn triangles_of(geometry: &FrameGeometry) -> Triangles<'_> {

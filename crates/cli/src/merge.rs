@@ -45,16 +45,12 @@ pub(crate) fn run(args: &MergeArgs) -> Result<(), Failure> {
             None => read_picture_up_to(path, limit)?,
         };
         if [picture.width, picture.height] != [width, height] {
-            let (a, b) = ([width, height], [picture.width, picture.height]);
+            let size = format!("{}x{}", picture.width, picture.height);
             return Err(Failure::new(
                 Code::Input,
                 format_args!(
-                    "{}: it is {}x{}, the first picture {}x{}",
-                    path.display(),
-                    b[0],
-                    b[1],
-                    a[0],
-                    a[1]
+                    "{}: it is {size}, the first picture {width}x{height}",
+                    path.display()
                 ),
             ));
         }

@@ -13,7 +13,7 @@ use std::sync::Mutex;
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use rayward::scene::{self, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight};
+use rayward::scene::{self, FrameGeometry, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
     AreaLight, AreaLightTree, AreaScratch, Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions,
     LightQuery, LitPixels, LitScratch, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits,
@@ -85,7 +85,7 @@ fn load(name: &str) -> Frame {
     let Some(mesh) = name.strip_suffix(".ply") else {
         let geometry = scene::builtin::build(name).expect("a built-in scene").at(0.0);
         let (camera, light) = (geometry.cameras[0].clone(), geometry.lights[0].clone());
-        let area = area(&geometry, square_at(&light, &geometry));
+        let area = area(&geometry, scene::square_light_at(&light, &geometry));
         return Frame {
             name: name.into(),
             clusters: Clusters::new(&triangles(&geometry)),
@@ -119,23 +119,6 @@ fn area(geometry: &FrameGeometry, light: PosedLight) -> AreaLight {
     let plan = FramePlan::new(geometry, &[light], &RenderOptions::default());
     let area = plan.lights[0].as_ref().and_then(|light| light.area);
     area.expect("a light with a size")
-}
-
-/// A square in the place of a light of a built-in scene, a tenth of its distance wide, that faces the scene's middle.
-fn square_at(light: &PosedLight, geometry: &FrameGeometry) -> PosedLight {
-    let (low, high) = geometry.bounds().expect("triangles");
-    let middle = geometry.origin + (low + high).as_dvec3() * 0.5;
-    let position = match light.kind {
-        LightKind::Directional { .. } => middle - light.direction * f64::from((high - low).length()),
-        _ => light.position,
-    };
-    let mut square = scene::point_light_for(position, middle);
-    let side = (position.distance(middle) * 0.1) as f32;
-    square.kind = LightKind::Rectangle {
-        width: side,
-        height: side,
-    };
-    square
 }
 
 fn view(frame: &Frame) -> View {

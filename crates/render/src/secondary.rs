@@ -94,42 +94,29 @@ impl SecondaryBuilder for CubeBuilder {
     }
 }
 
-impl SecondaryTracer for Ldc<'_> {
-    fn trace(&self, rays: &[SurfaceRay], hits: &mut Vec<SurfaceHit>) {
-        hits.clear();
-        hits.extend(rays.iter().map(|ray| self.after(ray, &mut ())));
-    }
+/// For structures that have these questions as methods of their own.
+macro_rules! answers_itself {
+    ($($structure:ident),*) => {$(
+        impl SecondaryTracer for $structure<'_> {
+            fn trace(&self, rays: &[SurfaceRay], hits: &mut Vec<SurfaceHit>) {
+                hits.clear();
+                hits.extend(rays.iter().map(|ray| self.after(ray, &mut ())));
+            }
 
-    fn each_between(
-        &self,
-        receiver: &Receiver,
-        light: &Light,
-        visit: &mut dyn FnMut(u32) -> ControlFlow<()>,
-    ) {
-        self.each_shadow(receiver, light, &mut (), visit);
-    }
+            fn each_between(
+                &self,
+                receiver: &Receiver,
+                light: &Light,
+                visit: &mut dyn FnMut(u32) -> ControlFlow<()>,
+            ) {
+                self.each_shadow(receiver, light, &mut (), visit);
+            }
 
-    fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>) {
-        Ldc::along(self, ray, &mut (), hits);
-    }
+            fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>) {
+                $structure::along(self, ray, &mut (), hits);
+            }
+        }
+    )*};
 }
 
-impl SecondaryTracer for Bvh<'_> {
-    fn trace(&self, rays: &[SurfaceRay], hits: &mut Vec<SurfaceHit>) {
-        hits.clear();
-        hits.extend(rays.iter().map(|ray| self.after(ray, &mut ())));
-    }
-
-    fn each_between(
-        &self,
-        receiver: &Receiver,
-        light: &Light,
-        visit: &mut dyn FnMut(u32) -> ControlFlow<()>,
-    ) {
-        self.each_shadow(receiver, light, &mut (), visit);
-    }
-
-    fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>) {
-        Bvh::along(self, ray, &mut (), hits);
-    }
-}
+answers_itself!(Bvh, Ldc);

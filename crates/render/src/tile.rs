@@ -164,7 +164,6 @@ impl TileShader<'_> {
     /// light. The layers are those of the first surface of which anything is seen.
     fn see(&self, tile: &Tile, [x, y]: [u32; 2], work: &mut TileWork) -> Sample {
         let ray = self.structures.eye.view().pixel_ray(tile.x + x, tile.y + y);
-        let backdrop = || self.backdrop(ray.dir.normalize().as_vec3());
         let mut seen = Seen {
             sample: Sample::background(Vec3::ZERO),
             left: 1.0,
@@ -176,7 +175,7 @@ impl TileShader<'_> {
         }
         seen.sample.alpha = 1.0 - seen.left;
         if seen.left > 0.0 {
-            seen.sample.color = backdrop() * seen.left;
+            seen.sample.color = self.backdrop(&ray) * seen.left;
         }
         seen.sample
     }

@@ -18,7 +18,7 @@ use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
 use crate::load::read_file;
-use crate::{Error, LightKind, PosedCamera, PosedLight, Projection};
+use crate::{Error, FrameGeometry, LightKind, PosedCamera, PosedLight, Projection};
 
 /// One scene's camera and lights.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -172,6 +172,25 @@ pub fn point_light_for(position: DVec3, center: DVec3) -> PosedLight {
         power: Vec3::splat(intensity as f32),
         range: f32::INFINITY,
         kind: LightKind::Point { radius: 0.0 },
+    }
+}
+
+/// A square in the place of a light, a tenth of its distance wide, that faces the middle of the scene; for a light without
+/// a place as far away as the scene is large.
+pub fn square_light_at(light: &PosedLight, geometry: &FrameGeometry) -> PosedLight {
+    let (low, high) = geometry.bounds().unwrap_or_default();
+    let middle = geometry.origin + (low + high).as_dvec3() * 0.5;
+    let position = match light.kind {
+        LightKind::Directional { .. } => middle - light.direction * f64::from((high - low).length()),
+        _ => light.position,
+    };
+    let side = (position.distance(middle) * 0.1) as f32;
+    PosedLight {
+        kind: LightKind::Rectangle {
+            width: side,
+            height: side,
+        },
+        ..point_light_for(position, middle)
     }
 }
 

@@ -17,7 +17,9 @@ mod material;
 mod pose;
 mod scene;
 
-pub use camera_file::{AreaLight, CameraEntry, find_camera, point_light_for, read_camera_file};
+pub use camera_file::{
+    AreaLight, CameraEntry, find_camera, point_light_for, read_camera_file, square_light_at,
+};
 pub use defaults::{default_camera, default_lights};
 pub use error::{Error, Notice};
 pub use frame::{FrameGeometry, ObjectRange, PosedCamera, PosedLight, VertexAttributes};

@@ -5,20 +5,6 @@
 @group(0) @binding(7) var<storage, read_write> peeled: array<atomic<u32>>;
 @group(0) @binding(8) var<storage, read> starts: array<u32>;
 
-struct Row {
-    r: Routed,
-    prim: u32,
-    row: u32,
-    columns: vec2u,
-}
-
-fn row_of(item: u32) -> Row {
-    let prim = owner(item);
-    let r = routed(prim);
-    let row = rows_of(r).x + item - row_starts[prim];
-    return Row(r, prim, row, columns_of(r, row));
-}
-
 @compute @workgroup_size(64)
 fn peel_depth(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
               @builtin(local_invocation_index) local: u32) {

@@ -35,6 +35,21 @@ fn owner(row: u32) -> u32 {
     return low;
 }
 
+// A row of a triangle, and its columns.
+struct Row {
+    r: Routed,
+    prim: u32,
+    row: u32,
+    columns: vec2u,
+}
+
+fn row_of(item: u32) -> Row {
+    let prim = owner(item);
+    let r = routed(prim);
+    let row = rows_of(r).x + item - row_starts[prim];
+    return Row(r, prim, row, columns_of(r, row));
+}
+
 @compute @workgroup_size(64)
 fn count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
          @builtin(local_invocation_index) local: u32) {
@@ -42,12 +57,9 @@ fn count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
     if item >= row_starts[frame.triangles] {
         return;
     }
-    let prim = owner(item);
-    let r = routed(prim);
-    let row = rows_of(r).x + item - row_starts[prim];
-    let columns = columns_of(r, row);
-    for (var column = columns.x; column < columns.y; column++) {
-        atomicAdd(&next[texel_index(r.axis, column, row)], 1u);
+    let t = row_of(item);
+    for (var column = t.columns.x; column < t.columns.y; column++) {
+        atomicAdd(&next[texel_index(t.r.axis, column, t.row)], 1u);
     }
 }
 
@@ -90,13 +102,10 @@ fn fill(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if item >= row_starts[frame.triangles] {
         return;
     }
-    let prim = owner(item);
-    let r = routed(prim);
-    let row = rows_of(r).x + item - row_starts[prim];
-    let columns = columns_of(r, row);
-    for (var column = columns.x; column < columns.y; column++) {
-        let at = atomicAdd(&next[texel_index(r.axis, column, row)], 1u);
-        write_sample(at, r, prim, column, row);
-        bound(r, column, row);
+    let t = row_of(item);
+    for (var column = t.columns.x; column < t.columns.y; column++) {
+        let at = atomicAdd(&next[texel_index(t.r.axis, column, t.row)], 1u);
+        write_sample(at, t.r, t.prim, column, t.row);
+        bound(t.r, column, t.row);
     }
 }

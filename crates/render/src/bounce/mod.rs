@@ -19,7 +19,7 @@
 mod light;
 
 use glam::Vec3;
-use rayward_trace::{Light, Receiver, Samples, SurfaceRay, Tile, exact};
+use rayward_trace::{Light, Receiver, Samples, SurfaceRay, Tile, ViewRay, exact};
 
 use crate::secondary::{SecondaryTracer, SurfaceHit};
 use crate::shade::lobes::{self, Lobe};
@@ -154,10 +154,12 @@ impl TileShader<'_> {
         light
     }
 
-    /// What is seen where no surface is.
-    pub(crate) fn backdrop(&self, towards: Vec3) -> Vec3 {
+    /// What is seen along a ray where no surface is.
+    pub(crate) fn backdrop(&self, ray: &ViewRay) -> Vec3 {
         match self.environment {
-            Some(environment) if self.options.show_environment => environment.radiance(towards),
+            Some(environment) if self.options.show_environment => {
+                environment.radiance(ray.dir.normalize().as_vec3())
+            }
             _ => self.options.background,
         }
     }

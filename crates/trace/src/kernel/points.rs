@@ -3,7 +3,7 @@
 //!
 //! Cost: about 25 vector instructions for sixteen points and one triangle.
 
-use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, mask32x16, prelude::*, u32x16};
 
 use super::edges::{EdgeLanes, EdgeRecord, Origin, VertexLanes, set_up};
 use super::{LANES, NEARNESS_BAND, SimdLevel};
@@ -42,6 +42,50 @@ pub(crate) fn set_up_casters(level: SimdLevel, vertices: &VertexLanes, rounding:
     dispatch!(level.0, simd => set_up(simd, vertices, Origin::OwnCorner, rounding, out));
 }
 
+/// How a caster stands to the lines of sixteen points.
+pub(super) struct Met<S: Simd> {
+    /// Above 1 a line certainly passes inside of the caster, below -1 certainly outside.
+    pub(super) inside: f32x16<S>,
+    /// The caster's, where the line meets its plane.
+    pub(super) nearness: f32x16<S>,
+    /// Where that nearness means nothing.
+    pub(super) vague: mask32x16<S>,
+    /// Whether it may lie between.
+    pub(super) possible: mask32x16<S>,
+}
+
+/// `None` if no line meets it. Points are x, y and nearness.
+#[inline(always)]
+pub(super) fn met<S: Simd>(simd: S, caster: &Caster, [x, y, nearness]: [f32x16<S>; 3]) -> Option<Met<S>> {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let Caster { record, origin } = caster;
+    let at = [x - splat(origin[0]), y - splat(origin[1])];
+    let g0 = plane(simd, at, [record.a[0], record.b[0], record.c[0]]);
+    let g1 = plane(simd, at, [record.a[1], record.b[1], record.c[1]]);
+    let g2 = plane(simd, at, [record.a[2], record.b[2], record.c[2]]);
+    let inside = g0.min(g1).min(g2);
+    let covered = inside.simd_ge(splat(-1.0));
+    if covered.all_false() {
+        return None;
+    }
+    let n = plane(simd, at, [record.nearness_x, record.nearness_y, record.nearness]);
+    let vague = !(n.simd_ge(splat(record.floor)) & n.simd_le(splat(record.ceiling)));
+    let farther = splat(1.0 + NEARNESS_BAND);
+    Some(Met {
+        inside,
+        nearness: n,
+        vague,
+        possible: covered & ((n * farther).simd_ge(nearness) | vague),
+    })
+}
+
+/// Value of `a x + b y + c`.
+#[inline(always)]
+fn plane<S: Simd>(simd: S, [x, y]: [f32x16<S>; 2], [a, b, c]: [f32; 3]) -> f32x16<S> {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    splat(a).mul_add(x, splat(b).mul_add(y, splat(c)))
+}
+
 /// Tests the `open` points (a bit each) against the casters `refs` until all are shadowed. Returns those that are
 /// still open; `unsure` collects pairs of lane and triangle that f32 could not tell, whether or not the point
 /// is found in shadow later.
@@ -69,20 +113,19 @@ fn shadowed_impl<S: Simd>(
     let x = f32x16::from_slice(simd, &points.x);
     let y = f32x16::from_slice(simd, &points.y);
     let nearness = f32x16::from_slice(simd, &points.nearness);
-    let (nearer, farther) = (splat(1.0 - NEARNESS_BAND), splat(1.0 + NEARNESS_BAND));
+    let nearer = splat(1.0 - NEARNESS_BAND);
     for &r in refs {
-        let Caster { record, origin } = &casters[r as usize];
-        let (px, py) = (x - splat(origin[0]), y - splat(origin[1]));
-        let plane = |a: f32, b: f32, c: f32| splat(a).mul_add(px, splat(b).mul_add(py, splat(c)));
-        let g = |i: usize| plane(record.a[i], record.b[i], record.c[i]);
-        let inside = g(0).min(g(1)).min(g(2));
-        let covered = inside.simd_ge(splat(-1.0));
-        if covered.all_false() {
+        let caster = &casters[r as usize];
+        let record = &caster.record;
+        let Some(Met {
+            inside,
+            nearness: n,
+            vague,
+            possible,
+        }) = met(simd, caster, [x, y, nearness])
+        else {
             continue;
-        }
-        let n = plane(record.nearness_x, record.nearness_y, record.nearness);
-        let vague = !(n.simd_ge(splat(record.floor)) & n.simd_le(splat(record.ceiling)));
-        let possible = covered & ((n * farther).simd_ge(nearness) | vague);
+        };
         let mut candidates = possible.to_bitmask() as u32 & open;
         if candidates == 0 {
             continue;

@@ -5,8 +5,8 @@
 
 use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
 
-use super::points::{Caster, PointLanes};
-use super::{NEARNESS_BAND, SimdLevel};
+use super::SimdLevel;
+use super::points::{Caster, Met, PointLanes, met};
 
 /// A triangle that lies before a point, or may.
 #[derive(Clone, Copy, Debug)]
@@ -43,20 +43,12 @@ fn veiled_impl<S: Simd>(
     let x = f32x16::from_slice(simd, &points.x);
     let y = f32x16::from_slice(simd, &points.y);
     let nearness = f32x16::from_slice(simd, &points.nearness);
-    let farther = splat(1.0 + NEARNESS_BAND);
     for &r in refs {
-        let Caster { record, origin } = &casters[r as usize];
-        let (px, py) = (x - splat(origin[0]), y - splat(origin[1]));
-        let plane = |a: f32, b: f32, c: f32| splat(a).mul_add(px, splat(b).mul_add(py, splat(c)));
-        let g = |i: usize| plane(record.a[i], record.b[i], record.c[i]);
-        let inside = g(0).min(g(1)).min(g(2));
-        let covered = inside.simd_ge(splat(-1.0));
-        if covered.all_false() {
+        let caster = &casters[r as usize];
+        let record = &caster.record;
+        let Some(Met { inside, possible, .. }) = met(simd, caster, [x, y, nearness]) else {
             continue;
-        }
-        let n = plane(record.nearness_x, record.nearness_y, record.nearness);
-        let vague = !(n.simd_ge(splat(record.floor)) & n.simd_le(splat(record.ceiling)));
-        let possible = covered & ((n * farther).simd_ge(nearness) | vague);
+        };
         let own = u32x16::from_slice(simd, &points.own).simd_eq(u32x16::splat(simd, record.prim));
         let mut left = possible.to_bitmask() as u32 & !(own.to_bitmask() as u32) & open;
         let met = inside.simd_gt(splat(1.0)).to_bitmask() as u32;
