@@ -1,12 +1,11 @@
 //! Builds alone, and what a second thread brings to them and to whole frames.
 
 use rayon::ThreadPool;
-use rayward::CasterPolicy;
 use rayward::trace::{EyeGrid, EyeGridOptions, SimdLevel, Visibility};
 use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
-use crate::ours::{Rayward, eye_grid, tile_side};
+use crate::ours::{Rayward, Ways, eye_grid, tile_side};
 use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch};
 
 /// What is measured.
@@ -87,7 +86,7 @@ pub fn measure(
         runs: options.runs,
         scenes: Vec::new(),
     };
-    let ours = Rayward::new(CasterPolicy::Auto);
+    let ours = Rayward::new(Ways::usual());
     for scene in scenes {
         progress(&scene.name);
         let size = [options.width, options.height];

@@ -69,7 +69,7 @@ impl Range {
     }
 }
 
-fn claim(claim: &'static str, verdict: Verdict, figures: String) -> Claim {
+pub(crate) fn claim(claim: &'static str, verdict: Verdict, figures: String) -> Claim {
     Claim {
         claim,
         verdict,

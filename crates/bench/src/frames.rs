@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
 use crate::embree::{self, Library, Quality};
-use crate::ours::{Rayward, tile_side};
+use crate::ours::{Rayward, Ways, tile_side};
 use crate::peers::{Obvhs, ObvhsTree, RegularGrid};
 use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, Times};
 
@@ -121,7 +121,7 @@ impl FramesReport {
 }
 
 /// A contender that threads can share.
-type Drawer<'s> = dyn Contender + Send + Sync + 's;
+pub(crate) type Drawer<'s> = dyn Contender + Send + Sync + 's;
 
 /// Gets every picture that is compared, with a name.
 pub type PictureSink<'p> = &'p mut (dyn FnMut(&str, &Picture) + Send);
@@ -173,9 +173,14 @@ fn contenders<'s>(
     libraries: &[Library],
 ) -> Result<Vec<Box<Drawer<'s>>>> {
     let triangles = scene.triangles();
-    let mut contenders: Vec<Box<Drawer<'s>>> = vec![Box::new(Rayward::new(CasterPolicy::Auto))];
+    let mut contenders: Vec<Box<Drawer<'s>>> = vec![Box::new(Rayward::new(Ways::usual()))];
     if options.kinds.iter().any(|&kind| kind != FrameKind::Eye) {
-        contenders.push(Box::new(Rayward::new(CasterPolicy::Both)));
+        let ways = Ways {
+            name: "rayward, both sides cast",
+            casters: CasterPolicy::Both,
+            ..Ways::usual()
+        };
+        contenders.push(Box::new(Rayward::new(ways)));
     }
     if options.peers {
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Wide)));
@@ -192,7 +197,12 @@ fn contenders<'s>(
     Ok(contenders)
 }
 
-fn measure_frame(job: &Job, contenders: &[Box<Drawer>], runs: usize, pictures: PictureSink) -> FrameReport {
+pub(crate) fn measure_frame(
+    job: &Job,
+    contenders: &[Box<Drawer>],
+    runs: usize,
+    pictures: PictureSink,
+) -> FrameReport {
     let (width, height) = (job.view.width, job.view.height);
     let takes_part = |c: &&Drawer| job.kind != FrameKind::Eye || !c.only_shadows();
     let contenders: Vec<&Drawer> = contenders.iter().map(|c| &**c).filter(takes_part).collect();

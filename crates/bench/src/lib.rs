@@ -8,18 +8,24 @@
 //! | what | module |
 //! |---|---|
 //! | frames of scenes, all contenders | [`frames`] |
-//! | cost against triangles, pixels, lights, samples, threads | [`scaling`] |
+//! | cost against triangles, pixels, lights, samples and more | [`scaling`] |
 //! | binning rate, and what a second thread brings | [`build`] |
-//! | the papers' tables and claims | [`tables`], [`steps`] |
+//! | each improvement taken away | [`ablation`] |
+//! | any structure for any class of rays | [`structures`] |
+//! | the papers' tables and claims | [`tables`], [`steps`], [`cubes`] |
+//! | all of it as a page, as Markdown and as text | [`report`] |
 //!
 //! Times are of the whole process, as processor time and as wall time; where the system does not tell the
 //! former, it is the latter. Runs of all contenders are interleaved, and a figure is a median with its range. This
 //! crate prints nothing.
 
+pub mod ablation;
+pub mod all;
 pub mod build;
 pub mod claims;
 mod clock;
 pub mod contender;
+pub mod cubes;
 mod embree;
 mod error;
 pub mod frames;
@@ -29,10 +35,12 @@ mod packet;
 mod papers;
 mod peers;
 mod picture;
+pub mod report;
 pub mod scaling;
 mod scene;
 mod stats;
 pub mod steps;
+pub mod structures;
 pub mod table;
 pub mod tables;
 

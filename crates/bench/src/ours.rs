@@ -8,19 +8,59 @@ use std::sync::Mutex;
 use glam::DVec3;
 use rayon::prelude::*;
 use rayward::trace::{
-    AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, Facets, Light, LightQuery,
-    LitPixels, LitScratch, Receiver, Tile, TileHits, View, Visibility, darken, darken_unlit, exact,
+    AreaLightTree, AreaScratch, BLOCK_LANES, Candidates, Casts, EyeGrid, EyeGridOptions, FaceOptions, Facets,
+    Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PerspectiveGrids, PointLightGrid, Receiver,
+    ShadowScratch, SimdLevel, Tile, TileHits, Visibility, darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
 use crate::contender::{Contender, FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::{Picture, Time};
 
-/// Rayward with one choice of casters.
+/// How Rayward draws: as it usually does, or with something taken away.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ways {
+    /// Name, for tables.
+    pub(crate) name: &'static str,
+    /// Which sides of triangles cast.
+    pub(crate) casters: CasterPolicy,
+    /// Parameters of the camera's grid.
+    pub(crate) eye: EyeGridOptions,
+    /// Whether that grid is built over clusters.
+    pub(crate) clusters: bool,
+    /// Grid of casters in which hard shadows are looked up pixel by pixel, instead of all at once.
+    pub(crate) looked_up: Option<LightGridOptions>,
+    /// Whether memory is kept from frame to frame.
+    pub(crate) keeps_memory: bool,
+    /// Grids in which soft shadows are followed ray by ray, instead of a tree.
+    pub(crate) followed: Option<FaceOptions>,
+    /// Whether the tree knows which triangles share edges.
+    pub(crate) sheets: bool,
+    /// Instruction set of the kernels, if not the job's.
+    pub(crate) level: Option<SimdLevel>,
+}
+
+impl Ways {
+    /// The usual ways.
+    pub(crate) fn usual() -> Self {
+        Self {
+            name: "rayward",
+            casters: CasterPolicy::Auto,
+            eye: EyeGridOptions::default(),
+            clusters: true,
+            looked_up: None,
+            keeps_memory: true,
+            followed: None,
+            sheets: true,
+            level: None,
+        }
+    }
+}
+
+/// Rayward, drawing in one of its ways.
 #[derive(Debug)]
 pub(crate) struct Rayward {
-    /// Which sides of triangles cast.
-    casters: CasterPolicy,
+    ways: Ways,
     /// Memory of the last frame.
     scratch: Mutex<LitScratch>,
 }
@@ -32,10 +72,7 @@ pub(crate) fn tile_side() -> u32 {
 
 impl Contender for Rayward {
     fn name(&self) -> String {
-        match self.casters {
-            CasterPolicy::Both => "rayward, both sides cast".into(),
-            _ => "rayward".into(),
-        }
+        self.ways.name.into()
     }
 
     fn build(&self) -> Option<Time> {
@@ -43,11 +80,11 @@ impl Contender for Rayward {
     }
 
     fn only_shadows(&self) -> bool {
-        self.casters == CasterPolicy::Both
+        self.ways.casters == CasterPolicy::Both
     }
 
     fn draw(&self, job: &Job, picture: &mut Picture) -> u64 {
-        let (eye, facets) = (eye_grid(job), job.facets());
+        let (eye, facets) = (self.eye(job), job.facets());
         match job.kind {
             FrameKind::Eye => {
                 picture.tiles_mut().for_each_init(TileHits::default, |hits, out| {
@@ -56,29 +93,40 @@ impl Contender for Rayward {
                 });
                 0
             }
-            FrameKind::EyeHard => self.draw_hard(job, &eye, &facets, picture),
-            FrameKind::EyeSoft => self.draw_soft(job, &eye, &facets, picture),
+            FrameKind::EyeHard => match self.ways.looked_up {
+                Some(options) => self.draw_looked_up(job, &eye, &facets, options, picture),
+                None => self.draw_hard(job, &eye, &facets, picture),
+            },
+            FrameKind::EyeSoft => match &self.ways.followed {
+                Some(options) => draw_followed(job, &eye, &facets, options, picture),
+                None => self.draw_soft(job, &eye, &facets, picture),
+            },
         }
     }
 }
 
-/// The camera's grid.
+/// The camera's grid, as usual.
 pub(crate) fn eye_grid<'s>(job: &Job<'s>) -> EyeGrid<'s> {
-    let options = EyeGridOptions::default();
-    EyeGrid::build_clustered(
-        job.view,
-        job.scene.triangles(),
-        &job.scene.clusters,
-        options,
-        job.level,
-    )
+    Rayward::new(Ways::usual()).eye(job)
 }
 
 impl Rayward {
-    pub(crate) fn new(casters: CasterPolicy) -> Self {
-        Self {
-            casters,
-            scratch: Mutex::default(),
+    pub(crate) fn new(ways: Ways) -> Self {
+        let scratch = Mutex::default();
+        Self { ways, scratch }
+    }
+
+    fn level(&self, job: &Job) -> SimdLevel {
+        self.ways.level.unwrap_or(job.level)
+    }
+
+    /// The camera's grid.
+    fn eye<'s>(&self, job: &Job<'s>) -> EyeGrid<'s> {
+        let (triangles, options, level) = (job.scene.triangles(), self.ways.eye, self.level(job));
+        if self.ways.clusters {
+            EyeGrid::build_clustered(job.view, triangles, &job.scene.clusters, options, level)
+        } else {
+            EyeGrid::build(job.view, triangles, options, level)
         }
     }
 
@@ -101,6 +149,9 @@ impl Rayward {
 
     /// Which pixels a light reaches, caster rules included.
     pub(crate) fn lit(&self, job: &Job, visibility: &Visibility, light: Light) -> LitPixels {
+        if !self.ways.keeps_memory {
+            *self.scratch.lock().expect("no light panics") = LitScratch::default();
+        }
         self.with_rule(job, light, |rule| {
             let query = LightQuery {
                 light,
@@ -113,10 +164,41 @@ impl Rayward {
                 &job.scene.triangles(),
                 &job.scene.clusters,
                 &query,
-                job.level,
+                self.level(job),
                 &mut self.scratch.lock().expect("no light panics"),
             )
         })
+    }
+
+    /// Hard shadows from a grid of casters, tile by tile, as HM08 has them.
+    fn draw_looked_up(
+        &self,
+        job: &Job,
+        eye: &EyeGrid,
+        facets: &Facets,
+        options: LightGridOptions,
+        picture: &mut Picture,
+    ) -> u64 {
+        let triangles = job.scene.triangles();
+        let grid = self.with_rule(job, job.light, |rule| {
+            PointLightGrid::build(job.light, triangles, rule, options, self.level(job))
+        });
+        let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
+            let tile = eye.tile(out.index);
+            eye.trace_tile(&tile, &mut work.hits);
+            facets.shade(&work.hits, out.corner, out.stride, out.blocks);
+            work.receive(facets, &tile, job);
+            work.keep_those_that_ask();
+            grid.shadowed(&work.receivers, &mut work.shadow_scratch, &mut work.shadow);
+            for (&place, &shadow) in work.places.iter().zip(&work.shadow) {
+                put(&mut work.lit, place, u32::from(!shadow));
+            }
+            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
+                darken(block, lit, 1);
+            }
+            std::mem::take(&mut work.asking)
+        });
+        tiles.sum()
     }
 
     /// Eye rays and a shadow ray from every hit to each of these lights, one light at a time, without shading; gives
@@ -130,13 +212,15 @@ impl Rayward {
     fn draw_soft(&self, job: &Job, eye: &EyeGrid, facets: &Facets, picture: &mut Picture) -> u64 {
         let triangles = job.scene.triangles();
         // Only both sides cast the shadow of a light with a size.
-        let tree = AreaLightTree::build(job.area, triangles, &|_| Casts::Both, job.level)
-            .with_topology(&job.scene.topology);
+        let mut tree = AreaLightTree::build(job.area, triangles, &|_| Casts::Both, self.level(job));
+        if self.ways.sheets {
+            tree = tree.with_topology(&job.scene.topology);
+        }
         let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
             let tile = eye.tile(out.index);
             eye.trace_tile(&tile, &mut work.hits);
             facets.shade(&work.hits, out.corner, out.stride, out.blocks);
-            work.receive(&job.view, facets, &tile, job);
+            work.receive(facets, &tile, job);
             let scratch = &mut work.scratch;
             tree.visible(
                 &work.receivers,
@@ -146,17 +230,10 @@ impl Rayward {
                 &mut work.bits,
             );
             let bits = work.bits.chunks(job.samples.words());
-            for (&place, bits) in work
-                .places
-                .iter()
-                .zip(bits)
-                .filter(|(place, _)| **place != NOWHERE)
-            {
+            for (&place, bits) in work.places.iter().zip(bits) {
                 let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
-                let place = usize::from(place);
                 // The share of all samples as so many of the usual number.
-                let lit = count * SOFT_SAMPLES / job.samples.count();
-                work.lit[place / BLOCK_LANES][place % BLOCK_LANES] = lit as u8;
+                put(&mut work.lit, place, count * SOFT_SAMPLES / job.samples.count());
             }
             for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
                 darken(block, lit, SOFT_SAMPLES as u8);
@@ -173,18 +250,59 @@ impl Rayward {
         light: Light,
         use_it: impl FnOnce(&(dyn Fn(u32) -> Casts + Sync)) -> R,
     ) -> R {
-        if self.casters == CasterPolicy::Both {
+        if self.ways.casters == CasterPolicy::Both {
             return use_it(&|_| Casts::Both);
         }
         let (scene, eye) = (job.scene, job.view.center.as_dvec3());
-        let (policy, topology) = (self.casters, &scene.topology);
+        let (policy, topology) = (self.ways.casters, &scene.topology);
         let rules = CasterRules::new(&scene.scene, &scene.geometry, topology, policy, Some(eye));
         let rule = rules.for_light(&scene.geometry, &light);
         use_it(&rule)
     }
 }
 
-/// Working memory of a thread for soft shadows.
+/// Soft shadows ray by ray through perspective grids around the middle of the light.
+fn draw_followed(
+    job: &Job,
+    eye: &EyeGrid,
+    facets: &Facets,
+    options: &FaceOptions,
+    picture: &mut Picture,
+) -> u64 {
+    let center = job.area_center().as_dvec3();
+    let grids = PerspectiveGrids::build(center, job.scene.triangles(), options);
+    let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
+        let tile = eye.tile(out.index);
+        eye.trace_tile(&tile, &mut work.hits);
+        facets.shade(&work.hits, out.corner, out.stride, out.blocks);
+        work.receive(facets, &tile, job);
+        let asked = work.places.iter().zip(&work.receivers).zip(&work.pixels);
+        for ((&place, receiver), &pixel) in asked.filter(|((place, _), _)| **place != NOWHERE) {
+            let lit = |&k: &u32| {
+                let end = job.area.sample(&job.samples, pixel, receiver.point, k);
+                job.area.shines_at(receiver.point) && !grids.shadows(receiver, &end, &mut ())
+            };
+            let count = (0..job.samples.count()).filter(lit).count() as u32;
+            put(&mut work.lit, place, count * SOFT_SAMPLES / job.samples.count());
+        }
+        for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
+            darken(block, lit, SOFT_SAMPLES as u8);
+        }
+        std::mem::take(&mut work.asking) * u64::from(job.samples.count())
+    });
+    tiles.sum()
+}
+
+/// Notes how much light a place gets.
+#[inline]
+fn put(lit: &mut [[u8; BLOCK_LANES]], place: u16, count: u32) {
+    if place != NOWHERE {
+        let place = usize::from(place);
+        lit[place / BLOCK_LANES][place % BLOCK_LANES] = count as u8;
+    }
+}
+
+/// Working memory of a thread for shadows tile by tile.
 #[derive(Default)]
 struct SoftWork {
     hits: TileHits,
@@ -194,6 +312,8 @@ struct SoftWork {
     places: Vec<u16>,
     bits: Vec<u32>,
     scratch: AreaScratch,
+    shadow_scratch: ShadowScratch,
+    shadow: Vec<bool>,
     lit: Vec<[u8; BLOCK_LANES]>,
     /// Receivers so far in the tile that ask.
     asking: u64,
@@ -202,7 +322,7 @@ struct SoftWork {
 impl SoftWork {
     /// The hits of a tile that are turned towards the light, squares of 4 x 4 pixels along a Z-curve. Pixels that do not ask
     /// keep their places, so that sixteen receivers are a square and 256 a square of squares.
-    fn receive(&mut self, view: &View, facets: &Facets, tile: &Tile, job: &Job) {
+    fn receive(&mut self, facets: &Facets, tile: &Tile, job: &Job) {
         self.receivers.clear();
         self.pixels.clear();
         self.places.clear();
@@ -214,7 +334,7 @@ impl SoftWork {
         for i in 0..side * side {
             let [column, row] = [i, i >> 1].map(compacted);
             if column < columns && row < rows {
-                asking += self.receive_block(view, facets, tile, (job, columns), [column, row]);
+                asking += self.receive_block(facets, tile, (job, columns), [column, row]);
             } else {
                 self.fill_up(BLOCK_LANES);
             }
@@ -231,6 +351,14 @@ impl SoftWork {
         }
     }
 
+    /// Leaves out the places of nobody.
+    fn keep_those_that_ask(&mut self) {
+        let mut places = self.places.iter();
+        self.receivers
+            .retain(|_| places.next().is_some_and(|&place| place != NOWHERE));
+        self.places.retain(|&place| place != NOWHERE);
+    }
+
     fn fill_up(&mut self, number: usize) {
         let nobody = Receiver::free(DVec3::NAN);
         self.receivers.extend(std::iter::repeat_n(nobody, number));
@@ -241,7 +369,6 @@ impl SoftWork {
     /// Adds a square of 4 x 4 pixels; returns how many of them ask.
     fn receive_block(
         &mut self,
-        view: &View,
         facets: &Facets,
         tile: &Tile,
         (job, columns): (&Job, u32),
@@ -254,7 +381,7 @@ impl SoftWork {
         for (lane, prim) in prims.into_iter().enumerate() {
             let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
             let sees = prim != u32::MAX && x < tile.width && y < tile.height && facets.facet(prim) > 0.0;
-            let ray = view.pixel_ray(tile.x + x, tile.y + y);
+            let ray = job.view.pixel_ray(tile.x + x, tile.y + y);
             let hit = sees.then(|| exact::attributes(ray.origin, ray.dir, triangles.corners(prim)));
             match hit.flatten() {
                 Some(hit) => {

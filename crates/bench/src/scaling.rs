@@ -1,14 +1,16 @@
-//! What a ray costs against triangles, pixels, lights, samples and threads: one curve for each, all else fixed.
+//! What a ray costs against triangles, pixels, lights, samples, the light's size, depth complexity, threads, and against
+//! how far from their common point rays start: one curve for each, all else fixed.
 //!
 //! Frames are those of [`crate::frames`], Rayward alone, every structure rebuilt. A curve of a cost per ray that stays
 //! flat says that the structures keep up; one that rises says what they do not hide.
 
-use rayward::CasterPolicy;
+mod distance;
+
 use rayward::trace::{Samples, SimdLevel};
 use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
-use crate::ours::{Rayward, tile_side};
+use crate::ours::{Rayward, Ways, tile_side};
 use crate::{BenchScene, Machine, Picture, Result, Stopwatch, Times};
 
 /// What is measured.
@@ -52,7 +54,7 @@ pub struct Curve {
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
     /// Value of the parameter.
-    pub value: u64,
+    pub value: f64,
     /// Triangles of the scene.
     pub triangles: usize,
     /// Width and height.
@@ -65,6 +67,8 @@ pub struct Point {
     pub ns_per_ray: f64,
     /// Wall time a ray, nanoseconds.
     pub wall_ns_per_ray: f64,
+    /// Cells that a ray passes and triangles that it is tested with, where they are counted.
+    pub steps: Option<[f64; 2]>,
 }
 
 struct Sizes {
@@ -73,6 +77,12 @@ struct Sizes {
     resolutions: &'static [[u32; 2]],
     lights: &'static [usize],
     samples: &'static [u32],
+    /// Sides of the light, of its usual one.
+    sides: &'static [f32],
+    /// Blobs, one behind the other.
+    layers: &'static [usize],
+    /// Distances of origins, of the scene's diagonal.
+    distances: &'static [f32],
     usual: [u32; 2],
 }
 
@@ -81,6 +91,9 @@ const FULL: Sizes = Sizes {
     resolutions: &[[640, 400], [1280, 800], [1920, 1200], [3840, 2160], [7680, 4320]],
     lights: &[1, 4, 16, 64],
     samples: &[1, 4, 16, 64, 256],
+    sides: &[0.1, 0.3, 1.0, 3.0, 10.0],
+    layers: &[1, 4, 16, 64],
+    distances: &[1e-4, 1e-3, 1e-2, 1e-1, 1.0],
     usual: [1920, 1200],
 };
 
@@ -89,6 +102,9 @@ const QUICK: Sizes = Sizes {
     resolutions: &[[64, 40], [128, 80]],
     lights: &[1, 2],
     samples: &[1, 16],
+    sides: &[1.0, 3.0],
+    layers: &[1, 3],
+    distances: &[1e-3, 1e-1],
     usual: [96, 60],
 };
 
@@ -105,55 +121,64 @@ pub fn measure(options: &ScalingOptions, progress: &mut dyn FnMut(&str)) -> Resu
     let mut curves = Vec::new();
     for kind in FrameKind::ALL {
         curves.push(against_triangles(options, &sizes, kind, progress)?);
-        let points = sizes.resolutions.iter().map(|&size| {
+        curves.push(curve("pixels", kind.name(), sizes.resolutions, |&size| {
             progress(&format!("resolution {}x{}, {}", size[0], size[1], kind.name()));
-            let value = u64::from(size[0]) * u64::from(size[1]);
+            let value = f64::from(size[0]) * f64::from(size[1]);
             one_thread(options, &Job::new(&scene, size, kind, options.level)?, value, 1)
-        });
-        curves.push(Curve {
-            parameter: "pixels",
-            scene: SCENE.into(),
-            frame: kind.name(),
-            points: points.collect::<Result<_>>()?,
-        });
+        })?);
     }
     let hard = Job::new(&scene, sizes.usual, FrameKind::EyeHard, options.level)?;
-    let points = sizes.lights.iter().map(|&lights| {
+    let soft = || Job::new(&scene, sizes.usual, FrameKind::EyeSoft, options.level);
+    curves.push(curve("lights", hard.kind.name(), sizes.lights, |&lights| {
         progress(&format!("lights {lights}"));
-        one_thread(options, &hard, lights as u64, lights)
-    });
-    curves.push(Curve {
-        parameter: "lights",
-        scene: SCENE.into(),
-        frame: FrameKind::EyeHard.name(),
-        points: points.collect::<Result<_>>()?,
-    });
-    let points = sizes.samples.iter().map(|&samples| {
+        one_thread(options, &hard, lights as f64, lights)
+    })?);
+    curves.push(curve("samples", "eye+soft", sizes.samples, |&samples| {
         progress(&format!("samples {samples}"));
-        let mut soft = Job::new(&scene, sizes.usual, FrameKind::EyeSoft, options.level)?;
-        soft.samples = Samples::new(samples, 1);
-        one_thread(options, &soft, u64::from(samples), 1)
-    });
-    curves.push(Curve {
-        parameter: "samples",
-        scene: SCENE.into(),
-        frame: "eye+soft",
-        points: points.collect::<Result<_>>()?,
-    });
-    let points = (1..=options.threads).map(|threads| {
+        let samples_of = Samples::new(samples, 1);
+        let job = Job {
+            samples: samples_of,
+            ..soft()?
+        };
+        one_thread(options, &job, f64::from(samples), 1)
+    })?);
+    curves.push(curve("light size", "eye+soft8", sizes.sides, |&side| {
+        progress(&format!("light size {side}"));
+        let area = scene.area_light_of_size(side);
+        one_thread(options, &Job { area, ..soft()? }, f64::from(side), 1)
+    })?);
+    curves.extend(against_layers(options, &sizes, progress)?);
+    let threads: Vec<usize> = (1..=options.threads).collect();
+    curves.push(curve("threads", hard.kind.name(), &threads, |&threads| {
         progress(&format!("threads {threads}"));
-        point(options, &hard, threads, threads as u64, 1)
-    });
-    curves.push(Curve {
-        parameter: "threads",
-        scene: SCENE.into(),
-        frame: FrameKind::EyeHard.name(),
-        points: points.collect::<Result<_>>()?,
-    });
+        point(options, &hard, threads, threads as f64, 1)
+    })?);
+    curves.extend(distance::curves(
+        options,
+        sizes.usual,
+        sizes.distances,
+        &scene,
+        progress,
+    )?);
     Ok(ScalingReport {
         machine: Machine::describe(options.level, options.threads),
         runs: options.runs,
         curves,
+    })
+}
+
+/// A curve of the usual scene.
+fn curve<V>(
+    parameter: &'static str,
+    frame: &'static str,
+    values: &[V],
+    point: impl FnMut(&V) -> Result<Point>,
+) -> Result<Curve> {
+    Ok(Curve {
+        parameter,
+        scene: SCENE.into(),
+        frame,
+        points: values.iter().map(point).collect::<Result<_>>()?,
     })
 }
 
@@ -163,32 +188,44 @@ fn against_triangles(
     kind: FrameKind,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Curve> {
-    let mut points = Vec::new();
-    for &frequency in sizes.blobs {
+    let points = curve("triangles", kind.name(), sizes.blobs, |&frequency| {
         let triangles = 20 * u64::from(frequency) * u64::from(frequency);
         progress(&format!("triangles {triangles}, {}", kind.name()));
         let scene = BenchScene::new("blob", rayward::scene::builtin::blob_of(frequency), None)?;
-        points.push(one_thread(
-            options,
-            &Job::new(&scene, sizes.usual, kind, options.level)?,
-            triangles,
-            1,
-        )?);
-    }
-    Ok(Curve {
-        parameter: "triangles",
-        scene: "blob".into(),
-        frame: kind.name(),
-        points,
-    })
+        let job = Job::new(&scene, sizes.usual, kind, options.level)?;
+        one_thread(options, &job, triangles as f64, 1)
+    })?;
+    let scene = "blob".into();
+    Ok(Curve { scene, ..points })
 }
 
-fn one_thread(options: &ScalingOptions, job: &Job, value: u64, lights: usize) -> Result<Point> {
+/// Blobs behind each other, of which the camera sees the first.
+fn against_layers(
+    options: &ScalingOptions,
+    sizes: &Sizes,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Vec<Curve>> {
+    let kinds = [FrameKind::Eye, FrameKind::EyeHard];
+    let of_kind = |kind: FrameKind| {
+        let points = curve("depth complexity", kind.name(), sizes.layers, |&layers| {
+            progress(&format!("depth complexity {layers}, {}", kind.name()));
+            let blob = rayward::scene::builtin::blob_of(22);
+            let scene = BenchScene::new("blob", blob, None)?.stacked(layers);
+            let job = Job::new(&scene, sizes.usual, kind, options.level)?;
+            one_thread(options, &job, layers as f64, 1)
+        })?;
+        let scene = "blobs in a row".into();
+        Ok(Curve { scene, ..points })
+    };
+    kinds.into_iter().map(of_kind).collect()
+}
+
+fn one_thread(options: &ScalingOptions, job: &Job, value: f64, lights: usize) -> Result<Point> {
     point(options, job, 1, value, lights)
 }
 
-fn point(options: &ScalingOptions, job: &Job, threads: usize, value: u64, lights: usize) -> Result<Point> {
-    let ours = Rayward::new(CasterPolicy::Auto);
+fn point(options: &ScalingOptions, job: &Job, threads: usize, value: f64, lights: usize) -> Result<Point> {
+    let ours = Rayward::new(Ways::usual());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
     let lights = job.scene.lights_around(lights);
     let (width, height) = (job.view.width, job.view.height);
@@ -203,13 +240,20 @@ fn point(options: &ScalingOptions, job: &Job, threads: usize, value: u64, lights
         (asked, Times::of(&runs))
     });
     let rays = u64::from(width) * u64::from(height) + asked;
-    Ok(Point {
-        value,
-        triangles: job.scene.geometry.triangle_count(),
-        resolution: [width, height],
-        rays,
-        times,
-        ns_per_ray: times.cpu_ms.median * 1e6 / rays as f64,
-        wall_ns_per_ray: times.wall_ms.median * 1e6 / rays as f64,
-    })
+    Ok(Point::new(value, job, rays, times))
+}
+
+impl Point {
+    fn new(value: f64, job: &Job, rays: u64, times: Times) -> Self {
+        Self {
+            value,
+            triangles: job.scene.geometry.triangle_count(),
+            resolution: [job.view.width, job.view.height],
+            rays,
+            times,
+            ns_per_ray: times.cpu_ms.median * 1e6 / rays as f64,
+            wall_ns_per_ray: times.wall_ms.median * 1e6 / rays as f64,
+            steps: None,
+        }
+    }
 }

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
 use rayward::scene::{
-    self, CameraEntry, FrameGeometry, LightKind, LoadOptions, PosedCamera, PosedLight, Scene, builtin,
+    self, CameraEntry, FrameGeometry, LightKind, LoadOptions, ObjectRange, PosedCamera, PosedLight, Scene,
+    builtin,
 };
 use rayward::trace::{AreaLight, Clusters, Light, Topology, Triangles, View};
 use rayward::{CameraFrame, FramePlan, RenderOptions};
@@ -55,6 +56,8 @@ pub struct BenchScene {
     camera: PosedCamera,
     light: PosedLight,
     area: AreaLight,
+    /// The same, as it is posed.
+    posed_area: PosedLight,
 }
 
 impl BenchScene {
@@ -115,8 +118,8 @@ impl BenchScene {
         lights.extend(scene::default_lights(&camera));
         let rectangle = |light: &&PosedLight| matches!(light.kind, LightKind::Rectangle { .. });
         let square = scene::square_light_at(&lights[0], &geometry);
-        let area = posed_area(&geometry, lights.iter().find(rectangle).unwrap_or(&square));
-        let area = area.ok_or(Error::Scene {
+        let posed = lights.iter().find(rectangle).unwrap_or(&square).clone();
+        let area = posed_area(&geometry, &posed).ok_or(Error::Scene {
             name: name.into(),
             problem: "its area light has no area",
         })?;
@@ -132,6 +135,7 @@ impl BenchScene {
             camera,
             light,
             area,
+            posed_area: posed,
         })
     }
 
@@ -164,6 +168,44 @@ impl BenchScene {
     /// Its area light: the first rectangle among its lights, or else a square in the place of its light.
     pub fn area_light(&self) -> AreaLight {
         self.area
+    }
+
+    /// The same with sides so many times as long.
+    pub(crate) fn area_light_of_size(&self, times: f32) -> AreaLight {
+        let mut light = self.posed_area.clone();
+        if let LightKind::Rectangle { width, height } = &mut light.kind {
+            (*width, *height) = (*width * times, *height * times);
+        }
+        posed_area(&self.geometry, &light).unwrap_or(self.area)
+    }
+
+    /// The same triangles so many times, one behind the other as its camera sees them.
+    pub(crate) fn stacked(mut self, layers: usize) -> Self {
+        let one = self.geometry.clone();
+        let (low, high) = one.bounds().unwrap_or_default();
+        let step = self.camera.forward.as_vec3() * (high - low).length();
+        let (vertices, triangles) = (one.x.len() as u32, one.indices.len() as u32);
+        for layer in 1..layers as u32 {
+            let (geometry, to) = (&mut self.geometry, step * layer as f32);
+            geometry.x.extend(one.x.iter().map(|x| x + to.x));
+            geometry.y.extend(one.y.iter().map(|y| y + to.y));
+            geometry.z.extend(one.z.iter().map(|z| z + to.z));
+            let shifted = |i: u32| i + layer * vertices;
+            geometry
+                .indices
+                .extend(one.indices.iter().map(|corners| corners.map(shifted)));
+            geometry
+                .objects
+                .extend(one.objects.iter().map(|object| ObjectRange {
+                    triangles: object.triangles.start + layer * triangles
+                        ..object.triangles.end + layer * triangles,
+                    vertices: shifted(object.vertices.start)..shifted(object.vertices.end),
+                    ..object.clone()
+                }));
+        }
+        self.topology = Topology::analyse(&triangles_of(&self.geometry));
+        self.clusters = Clusters::new(&triangles_of(&self.geometry));
+        self
     }
 
     /// Lights on a circle around the line from the middle of the scene to its light, for scenes with many.

@@ -1,10 +1,9 @@
-//! Reports as text for people, and as rows for spreadsheets.
+//! Tables, and reports as rows for spreadsheets.
 
 use crate::build::{BuildReport, Scaled, SceneBuilds};
-use crate::claims::Verdict;
-use crate::frames::{FrameReport, FramesReport};
+use crate::frames::FramesReport;
 use crate::scaling::ScalingReport;
-use crate::steps::StepReport;
+use crate::structures::StructuresReport;
 use crate::tables::TablesReport;
 use crate::{Machine, Spread};
 
@@ -25,6 +24,11 @@ impl Table {
     /// Adds a row.
     pub fn row(&mut self, cells: Vec<String>) {
         self.rows.push(cells);
+    }
+
+    /// All rows, the headings first.
+    pub fn rows(&self) -> &[Vec<String>] {
+        &self.rows
     }
 
     /// Its lines.
@@ -73,11 +77,11 @@ pub fn number(value: f64) -> String {
     }
 }
 
-fn optional(value: Option<f64>) -> String {
+pub(crate) fn optional(value: Option<f64>) -> String {
     value.map_or("-".into(), number)
 }
 
-fn spread(spread: Spread) -> String {
+pub(crate) fn spread(spread: Spread) -> String {
     let Spread { median, min, max } = spread;
     format!("{} ({}..{})", number(median), number(min), number(max))
 }
@@ -97,61 +101,6 @@ pub fn machine(machine: &Machine) -> String {
     format!(
         "rayward {rayward} with {simd} on {threads} of {processors} processors, {processor}, {system}{load}\n"
     )
-}
-
-/// Frames for people.
-pub fn frames(report: &FramesReport) -> String {
-    let embree = match report.embree.len() {
-        0 => "not found".to_owned(),
-        _ => report.embree.join(" and "),
-    };
-    let mut text = machine(&report.machine);
-    text += &format!(
-        "{}x{}, medians of {} runs in turns (smallest..largest), processor time; Embree: {embree}\n\
-         rayward builds everything in every frame; what the others keep is built once and in no frame's time\n",
-        report.width, report.height, report.runs
-    );
-    for frame in &report.frames {
-        text.push('\n');
-        text += &one_frame(frame);
-    }
-    text
-}
-
-fn one_frame(frame: &FrameReport) -> String {
-    let mut text = format!(
-        "{}, {} triangles, {}: {} eye rays, {} shadow rays\n",
-        frame.scene, frame.triangles, frame.frame, frame.eye_rays, frame.shadow_rays
-    );
-    let mut table = Table::new(&[
-        "contender",
-        "frame ms",
-        "wall ms",
-        "Mray/s",
-        "x rayward",
-        "kept build ms",
-        "pixels that differ",
-    ]);
-    for row in &frame.rows {
-        let (cpu, wall) = match &row.times {
-            Some(times) => (spread(times.cpu_ms), number(times.wall_ms.median)),
-            None => ("ANOTHER PICTURE".into(), "-".into()),
-        };
-        table.row(vec![
-            row.contender.clone(),
-            cpu,
-            wall,
-            optional(row.mray_per_s),
-            optional(row.over_rayward),
-            optional(row.kept_build_ms),
-            row.differing_pixels.to_string(),
-        ]);
-    }
-    text += &table.text();
-    if let (Some(ratio), Some(peer)) = (frame.ratio, &frame.best_peer) {
-        text += &format!("rayward is {} times as fast as {peer}\n", number(ratio));
-    }
-    text
 }
 
 /// Frames as comma-separated values, one line a contender.
@@ -201,40 +150,6 @@ pub fn frames_csv(report: &FramesReport) -> String {
     table.csv()
 }
 
-/// Curves for people.
-pub fn scaling(report: &ScalingReport) -> String {
-    let mut text = machine(&report.machine);
-    text += &format!(
-        "medians of {} runs (smallest..largest), everything built in every frame\n",
-        report.runs
-    );
-    for curve in &report.curves {
-        text += &format!("\n{} of {}, {}\n", curve.parameter, curve.scene, curve.frame);
-        let mut table = Table::new(&[
-            curve.parameter,
-            "triangles",
-            "resolution",
-            "rays",
-            "frame ms",
-            "wall ms",
-            "ns a ray",
-        ]);
-        for point in &curve.points {
-            table.row(vec![
-                point.value.to_string(),
-                point.triangles.to_string(),
-                format!("{}x{}", point.resolution[0], point.resolution[1]),
-                point.rays.to_string(),
-                spread(point.times.cpu_ms),
-                spread(point.times.wall_ms),
-                number(point.ns_per_ray),
-            ]);
-        }
-        text += &table.text();
-    }
-    text
-}
-
 /// Curves as comma-separated values, one line a point.
 pub fn scaling_csv(report: &ScalingReport) -> String {
     let mut table = Table::new(&[
@@ -250,9 +165,12 @@ pub fn scaling_csv(report: &ScalingReport) -> String {
         "wall_ms",
         "ns_per_ray",
         "wall_ns_per_ray",
+        "cells_per_ray",
+        "tests_per_ray",
     ]);
     for curve in &report.curves {
         for point in &curve.points {
+            let step = |i: usize| point.steps.map_or(String::new(), |steps| steps[i].to_string());
             table.row(vec![
                 curve.parameter.into(),
                 point.value.to_string(),
@@ -266,6 +184,8 @@ pub fn scaling_csv(report: &ScalingReport) -> String {
                 point.times.wall_ms.median.to_string(),
                 point.ns_per_ray.to_string(),
                 point.wall_ns_per_ray.to_string(),
+                step(0),
+                step(1),
             ]);
         }
     }
@@ -273,50 +193,13 @@ pub fn scaling_csv(report: &ScalingReport) -> String {
 }
 
 /// The pieces of work of a scene, with their names.
-fn pieces(scene: &SceneBuilds) -> [(&'static str, &Scaled); 4] {
+pub(crate) fn pieces(scene: &SceneBuilds) -> [(&'static str, &Scaled); 4] {
     [
         ("eye grid", &scene.eye_grid),
         ("binning of all", &scene.binning),
         ("hard shadows", &scene.shadows),
         ("frame eye+hard", &scene.frame),
     ]
-}
-
-/// Builds for people.
-pub fn build(report: &BuildReport) -> String {
-    let threads = report.machine.threads;
-    let mut text = machine(&report.machine);
-    text += &format!(
-        "medians of {} runs in turns (smallest..largest); processor time on one thread, wall time on 1 and {threads}\n\n",
-        report.runs
-    );
-    let mut table = Table::new(&[
-        "scene",
-        "triangles",
-        "what",
-        "cpu ms",
-        "M triangles/s",
-        "wall ms, 1",
-        &format!("wall ms, {threads}"),
-        "speed-up",
-        "of fastest",
-    ]);
-    for scene in &report.scenes {
-        for (what, scaled) in pieces(scene) {
-            table.row(vec![
-                scene.scene.clone(),
-                scene.triangles.to_string(),
-                what.into(),
-                spread(scaled.cpu_ms),
-                number(scaled.mtriangles_per_s),
-                spread(scaled.wall_ms),
-                spread(scaled.wall_ms_parallel),
-                number(scaled.speed_up),
-                number(scaled.speed_up_of_fastest),
-            ]);
-        }
-    }
-    text + &table.text()
 }
 
 /// Builds as comma-separated values, one line for each piece of work.
@@ -352,97 +235,8 @@ pub fn build_csv(report: &BuildReport) -> String {
     table.csv()
 }
 
-/// The papers' tables for people.
-pub fn tables(report: &TablesReport) -> String {
-    let [width, height] = report.size;
-    let mut text = machine(&report.machine);
-    text += &format!(
-        "medians of {} runs, wall time, everything of ours rebuilt in every frame; HM08's figures are of one core of 2006\n\n\
-         HM08, Table 1, {width}x{height}\n",
-        report.runs
-    );
-    text += &frame_lines(report).text();
-    let mut table = Table::new(&[
-        "scene",
-        "frame",
-        "fps",
-        "x regular grid",
-        "paper",
-        "x hierarchy, rebuilt",
-        "paper",
-        "x hierarchy, prebuilt",
-        "paper",
-        "fastest hierarchy",
-    ]);
-    for line in &report.peers {
-        let over = |other: Option<f64>| optional(other.map(|other| line.fps / other));
-        let [grid, rebuilt, prebuilt] = line.paper_ratios.map(optional);
-        table.row(vec![
-            line.scene.clone(),
-            line.frame.into(),
-            number(line.fps),
-            over(line.grid_fps),
-            grid,
-            over(line.rebuilt_fps),
-            rebuilt,
-            over(line.prebuilt_fps),
-            prebuilt,
-            line.fastest.clone().unwrap_or_else(|| "-".into()),
-        ]);
-    }
-    text += &format!("\nHM08, Tables 2 and 3, square pictures\n{}", table.text());
-    let raster = &report.raster;
-    text += &format!(
-        "\nHM08, Table 4, {}\n{} million triangles a second with {:.1} % of the window covered (paper: {}), {} million \
-         vertices a second out of sight (paper: {})\n",
-        raster.scene,
-        number(raster.mtriangles_per_s[0]),
-        raster.covered * 100.0,
-        raster.mtriangles_per_s[1],
-        number(raster.mvertices_per_s[0]),
-        raster.mvertices_per_s[1]
-    );
-    text += &format!("\n{}\nHM08, claims\n", steps(&report.steps));
-    for claim in &report.claims {
-        let verdict = match claim.verdict {
-            Verdict::Exceeded => "exceeded    ",
-            Verdict::Reproduced => "reproduced  ",
-            Verdict::Not => "NOT         ",
-            Verdict::NotMeasured => "not measured",
-        };
-        text += &format!("{verdict}  {}: {}\n", claim.claim, claim.figures);
-    }
-    text
-}
-
-fn steps(report: &StepReport) -> String {
-    let mut table = Table::new(&["grid", "cells", "cells a ray", "tests a ray", "references"]);
-    for grid in &report.grids {
-        let [x, y, z] = grid.cells;
-        table.row(vec![
-            if grid.perspective {
-                "perspective"
-            } else {
-                "regular"
-            }
-            .into(),
-            format!("{x}x{y}x{z}"),
-            number(grid.steps),
-            number(grid.tests),
-            grid.references.to_string(),
-        ]);
-    }
-    format!(
-        "HM08, Table 5, {}, {} shadow rays, {:.0} % of them in shadow; the paper has 52.0 and 12.7\n{}",
-        report.scene,
-        report.rays,
-        report.in_shadow * 100.0,
-        table.text()
-    )
-}
-
 /// Table 1.
-fn frame_lines(report: &TablesReport) -> Table {
+pub(crate) fn frame_lines(report: &TablesReport) -> Table {
     let threads = format!("fps, {} threads", report.machine.threads);
     let mut table = Table::new(&[
         "scene",
@@ -472,6 +266,95 @@ fn frame_lines(report: &TablesReport) -> Table {
             number(line.paper_mray_per_s),
             number(line.build * 100.0),
             number(line.paper_build * 100.0),
+        ]);
+    }
+    table
+}
+
+/// Structures as comma-separated values, one line for each class of rays of each.
+pub fn structures_csv(report: &StructuresReport) -> String {
+    let mut table = Table::new(&[
+        "scene",
+        "triangles",
+        "class",
+        "structure",
+        "rays",
+        "hits",
+        "differing",
+        "ns_per_ray",
+        "nodes_per_ray",
+        "tests_per_ray",
+        "build_ms",
+        "bytes",
+    ]);
+    let value = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
+    for scene in &report.scenes {
+        for class in &scene.classes {
+            for row in &class.rows {
+                let built = scene.structures.iter().find(|built| built.name == row.structure);
+                table.row(vec![
+                    scene.scene.clone(),
+                    scene.triangles.to_string(),
+                    class.class.into(),
+                    row.structure.clone(),
+                    row.rays.to_string(),
+                    row.hits.to_string(),
+                    row.differing.to_string(),
+                    value(row.ns_per_ray),
+                    value(row.nodes_per_ray),
+                    value(row.tests_per_ray),
+                    value(built.map(|built| built.build_ms)),
+                    built
+                        .and_then(|built| built.bytes)
+                        .map_or(String::new(), |bytes| bytes.to_string()),
+                ]);
+            }
+        }
+    }
+    table.csv()
+}
+
+/// VMV07's Table 1.
+pub(crate) fn cube_lines(report: &TablesReport) -> Table {
+    let mut table = Table::new(&[
+        "scene",
+        "stands for",
+        "triangles",
+        "texels",
+        "layers",
+        "paper",
+        "A, peeled",
+        "A, swept",
+        "paper",
+        "B, exact",
+        "B, planes",
+        "B, bvh",
+        "paper",
+        "Mray",
+        "MB",
+        "planes wrong %",
+        "cube map wrong %",
+    ]);
+    for line in &report.cubes {
+        let paper = |i: usize| line.paper_ms.map_or("-".into(), |ms| number(ms[i]));
+        table.row(vec![
+            line.scene.clone(),
+            format!("{}, {}k", line.paper_scene, line.paper_ktriangles),
+            line.triangles.to_string(),
+            line.resolution.to_string(),
+            line.layers.into_iter().max().unwrap_or(0).to_string(),
+            line.paper_layers.to_string(),
+            number(line.peel_ms),
+            number(line.build_ms),
+            paper(0),
+            number(line.trace_ms),
+            number(line.planes_ms),
+            number(line.bvh_ms),
+            paper(1),
+            number(line.rays as f64 / 1e6),
+            number(line.bytes as f64 / 1e6),
+            number(line.planes_wrong * 100.0),
+            number(line.map_wrong * 100.0),
         ]);
     }
     table

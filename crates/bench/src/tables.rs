@@ -1,16 +1,16 @@
 //! The papers' tables with our figures beside theirs, and a line for each of their claims.
 //!
-//! HM08, Tables 1 to 5 and the claims of its text. Scenes are the built-in stand-ins, and the real meshes where a folder of
+//! HM08, Tables 1 to 5, VMV07, Table 1, and the claims of their texts. Scenes are the built-in stand-ins, and the real meshes where a folder of
 //! scenes has them. The paper's figures are of one core of 2006; the machine of ours is told in the head.
 
-use rayward::CasterPolicy;
 use rayward::trace::{AreaLightTree, Casts, SimdLevel, Visibility};
 use serde::Serialize;
 
 use crate::claims::{Claim, Evidence};
 use crate::contender::{Contender, FrameKind, Job};
+use crate::cubes::{self, CubeLine};
 use crate::frames::{self, FrameReport, FramesOptions, Row};
-use crate::ours::{Rayward, eye_grid, tile_side};
+use crate::ours::{Rayward, Ways, eye_grid, tile_side};
 use crate::papers::{TABLE_1, TABLE_4, TABLES_2_3};
 use crate::steps::{self, StepReport};
 use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch};
@@ -26,6 +26,8 @@ pub struct TablesOptions {
     pub runs: usize,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Texels along the longest side of the layered depth cubes.
+    pub cubes: Vec<u32>,
     /// Folder of scenes, with a camera file.
     pub folder: Option<std::path::PathBuf>,
 }
@@ -47,8 +49,12 @@ pub struct TablesReport {
     pub raster: RasterLine,
     /// Table 5.
     pub steps: StepReport,
-    /// What the paper claims.
+    /// What HM08 claims.
     pub claims: Vec<Claim>,
+    /// VMV07's Table 1.
+    pub cubes: Vec<CubeLine>,
+    /// What VMV07 claims.
+    pub cube_claims: Vec<Claim>,
 }
 
 /// One kind of frame of one scene in Table 1.
@@ -130,6 +136,7 @@ pub fn measure(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Resul
     let raster = table_4(options)?;
     progress("Table 5");
     let steps = steps::measure(&BenchScene::load("courtyard", None)?)?;
+    let cubes = cubes::table(options, progress)?;
     let evidence = Evidence {
         threads: options.threads,
         frames: &frames,
@@ -146,13 +153,15 @@ pub fn measure(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Resul
         peers,
         raster,
         steps,
+        cube_claims: cubes::claims(&cubes),
+        cubes,
     })
 }
 
 fn table_1(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<Vec<FrameLine>> {
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let (one, all) = (pool(1)?, pool(options.threads)?);
-    let ours = Rayward::new(CasterPolicy::Auto);
+    let ours = Rayward::new(Ways::usual());
     let mut lines = Vec::new();
     for paper in &TABLE_1 {
         let mesh = options.folder.as_ref().and(paper.mesh);
@@ -212,7 +221,7 @@ fn build(job: &Job) {
 
 fn untested(job: &Job) -> f64 {
     let visibility = Visibility::trace(&eye_grid(job), &|| ());
-    let counts = Rayward::new(CasterPolicy::Auto)
+    let counts = Rayward::new(Ways::usual())
         .lit(job, &visibility, job.light)
         .counts;
     counts.untested as f64 / counts.receivers.max(1) as f64
@@ -289,7 +298,7 @@ fn table_4(options: &TablesOptions) -> Result<RasterLine> {
     };
     let mut scene = BenchScene::load(name, options.folder.as_deref())?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let ours = Rayward::new(CasterPolicy::Auto);
+    let ours = Rayward::new(Ways::usual());
     let mut picture = Picture::new(side, side, tile_side());
     let covered = |scene: &BenchScene| -> Result<f64> {
         let job = Job::new(scene, [side; 2], FrameKind::Eye, options.level)?;

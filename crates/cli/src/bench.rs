@@ -1,19 +1,16 @@
-//! `rayward bench`: measurements beside other ray tracers, see the crate `rayward-bench`.
+//! `rayward bench`: measurements beside other ray tracers, see the crate `rayward-bench`. Its arguments; `bench/run.rs`
+//! measures and tells.
 
-use std::path::{Path, PathBuf};
+mod run;
+
+use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
-use rayward::image_io::write_png;
-use rayward::trace::SimdLevel;
-use rayward_bench::build::{self, BuildOptions};
-use rayward_bench::frames::{self, FramesOptions, FramesReport};
-use rayward_bench::scaling::{self, ScalingOptions};
-use rayward_bench::tables::{self, TablesOptions};
-use rayward_bench::{BenchScene, FrameKind, Picture, table};
+use rayward_bench::FrameKind;
+use rayward_bench::structures::RayClass;
 
-use crate::failure::{Code, Failure};
-use crate::report;
 use crate::values::{self, Size};
+pub(crate) use run::run;
 
 const HELP: &str = "\
 Environment:
@@ -26,7 +23,9 @@ Examples:
   rayward bench frames --json > frames.json
   rayward bench scaling --quick
   rayward bench build courtyard
-  rayward bench tables";
+  rayward bench tables
+  rayward bench structures model.glb --rays random --csv
+  rayward bench all --report report";
 
 /// `rayward bench`
 #[derive(Debug, Args)]
@@ -40,12 +39,18 @@ pub(crate) struct BenchArgs {
 enum What {
     /// Whole frames of scenes, beside other ray tracers; exit code 5 if pictures differ
     Frames(FramesArgs),
-    /// What a ray costs against triangles, pixels, lights, samples and threads
+    /// What a ray costs against triangles, pixels, lights, samples, the light's size, depth complexity, threads and origins
     Scaling(ScalingArgs),
     /// Builds alone, and what further threads bring
     Build(BuildArgs),
-    /// The tables and claims of Hunt and Mark's paper, with our figures beside theirs
+    /// The tables and claims of both papers, with our figures beside theirs
     Tables(TablesArgs),
+    /// Frames with one improvement taken away, and in the papers' ways; exit code 5 if pictures differ
+    Ablation(AblationArgs),
+    /// Any structure for any class of rays; exit code 5 if answers differ
+    Structures(StructuresArgs),
+    /// All of these, with what falls short first
+    All(AllArgs),
 }
 
 /// `rayward bench frames`
@@ -109,8 +114,64 @@ struct TablesArgs {
     /// Worker threads of the parallel columns; one for each core unless given
     #[arg(long, value_name = "NUMBER", value_parser = threads())]
     threads: Option<u32>,
+    /// Resolutions of the layered depth cubes
+    #[arg(long, value_name = "TEXELS", value_delimiter = ',', default_values = ["512", "1024"], value_parser = texels())]
+    cubes: Vec<u32>,
     #[command(flatten)]
     run: MeasureArgs,
+}
+
+/// `rayward bench ablation`
+#[derive(Debug, Args)]
+struct AblationArgs {
+    /// Built-in scenes, scenes of the scenes folder by name, or files; a few built-in ones unless given
+    scenes: Vec<String>,
+    /// Width and height of the pictures
+    #[arg(long, value_name = "WxH", value_parser = values::size, default_value = "960x600")]
+    resolution: Size,
+    /// Worker threads
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, value_parser = threads())]
+    threads: u32,
+    #[command(flatten)]
+    run: MeasureArgs,
+}
+
+/// `rayward bench structures`
+#[derive(Debug, Args)]
+struct StructuresArgs {
+    /// Built-in scenes, scenes of the scenes folder by name, or files; a few built-in ones unless given
+    scenes: Vec<String>,
+    /// Classes of rays
+    #[arg(long, value_name = "CLASSES", value_delimiter = ',', default_values = ["eye", "hard", "soft", "reflection", "random", "through"])]
+    rays: Vec<Class>,
+    /// Rays of a class, about
+    #[arg(long, value_name = "NUMBER", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
+    number: u32,
+    /// Texels along the longest side of the layered depth cubes
+    #[arg(long, value_name = "TEXELS", default_value_t = 512, value_parser = texels())]
+    cube: u32,
+    /// Only Rayward
+    #[arg(long)]
+    no_peers: bool,
+    #[command(flatten)]
+    run: MeasureArgs,
+}
+
+/// `rayward bench all`
+#[derive(Debug, Args)]
+struct AllArgs {
+    /// Small sizes only
+    #[arg(long)]
+    quick: bool,
+    /// Most worker threads; one for each core unless given
+    #[arg(long, value_name = "NUMBER", value_parser = threads())]
+    threads: Option<u32>,
+    #[command(flatten)]
+    run: RunArgs,
+}
+
+fn texels() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(16..=4096)
 }
 
 fn threads() -> clap::builder::RangedI64ValueParser<u32> {
@@ -120,19 +181,30 @@ fn threads() -> clap::builder::RangedI64ValueParser<u32> {
 /// How it is measured and told.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Measuring")]
-struct MeasureArgs {
+struct RunArgs {
     /// Runs of each measurement
     #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
     /// One JSON object on standard output
-    #[arg(long, conflicts_with = "csv")]
-    json: bool,
-    /// Comma-separated values on standard output
     #[arg(long)]
-    csv: bool,
+    json: bool,
+    /// Folder for the report as a page (index.html) and as Markdown (report.md), with its plots
+    #[arg(long, value_name = "FOLDER")]
+    report: Option<PathBuf>,
     /// Nothing but errors on standard error
     #[arg(short, long)]
     quiet: bool,
+}
+
+/// The same, of what has rows.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Measuring")]
+struct MeasureArgs {
+    #[command(flatten)]
+    run: RunArgs,
+    /// Comma-separated values on standard output
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
 }
 
 /// A kind of frame by name.
@@ -158,178 +230,32 @@ impl From<Kind> for FrameKind {
     }
 }
 
-/// Measures and tells.
-pub(crate) fn run(args: &BenchArgs) -> Result<(), Failure> {
-    match &args.what {
-        What::Frames(args) => run_frames(args),
-        What::Scaling(args) => run_scaling(args),
-        What::Build(args) => run_build(args),
-        What::Tables(args) => run_tables(args),
-    }
+/// A class of rays by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Class {
+    /// Of all pixels, closest hits
+    Eye,
+    /// From what the eye sees to the light
+    Hard,
+    /// From what the eye sees to eight points of an area light
+    Soft,
+    /// Mirrored by what the eye sees, closest hits
+    Reflection,
+    /// Between random points, closest hits
+    Random,
+    /// Between random points, all hits
+    Through,
 }
 
-impl From<rayward_bench::Error> for Failure {
-    fn from(error: rayward_bench::Error) -> Self {
-        use rayward_bench::Error;
-        let code = match error {
-            Error::Rayward(error) => return error.into(),
-            Error::UnknownScene { .. } => Code::Usage,
-            Error::Scene { .. } | Error::Embree { .. } => Code::Input,
-            _ => Code::Runtime,
-        };
-        Self::new(code, error)
-    }
-}
-
-fn run_frames(args: &FramesArgs) -> Result<(), Failure> {
-    let options = FramesOptions {
-        width: args.resolution.width,
-        height: args.resolution.height,
-        kinds: args.frames.iter().map(|&kind| kind.into()).collect(),
-        threads: args.threads as usize,
-        runs: args.run.runs as usize,
-        peers: !args.no_peers,
-        ..FramesOptions::default()
-    };
-    let scenes = load(&args.scenes, &args.run)?;
-    let mut problem = None;
-    let mut keep = |name: &str, picture: &Picture| {
-        if let (Some(folder), None) = (&args.pictures, &problem) {
-            problem = write(folder, name, &options, picture).err();
-        }
-    };
-    let measured = frames::measure(&scenes, &options, &mut |what| args.run.progress(what), &mut keep)?;
-    if let Some(problem) = problem {
-        return Err(problem);
-    }
-    tell(
-        &args.run,
-        &measured,
-        table::frames(&measured),
-        table::frames_csv(&measured),
-    )?;
-    judge(&measured)
-}
-
-fn run_scaling(args: &ScalingArgs) -> Result<(), Failure> {
-    let options = ScalingOptions {
-        quick: args.quick,
-        threads: args.threads.map_or_else(cores, |threads| threads as usize),
-        runs: args.run.runs as usize,
-        level: SimdLevel::detect(),
-    };
-    let measured = scaling::measure(&options, &mut |what| args.run.progress(what))?;
-    tell(
-        &args.run,
-        &measured,
-        table::scaling(&measured),
-        table::scaling_csv(&measured),
-    )
-}
-
-fn run_build(args: &BuildArgs) -> Result<(), Failure> {
-    let options = BuildOptions {
-        width: args.resolution.width,
-        height: args.resolution.height,
-        threads: args.threads as usize,
-        runs: args.run.runs as usize,
-        level: SimdLevel::detect(),
-    };
-    let scenes = load(&args.scenes, &args.run)?;
-    let measured = build::measure(&scenes, &options, &mut |what| args.run.progress(what))?;
-    tell(
-        &args.run,
-        &measured,
-        table::build(&measured),
-        table::build_csv(&measured),
-    )
-}
-
-fn run_tables(args: &TablesArgs) -> Result<(), Failure> {
-    let options = TablesOptions {
-        size: [args.resolution.width, args.resolution.height],
-        threads: args.threads.map_or_else(cores, |threads| threads as usize),
-        runs: args.run.runs as usize,
-        level: SimdLevel::detect(),
-        folder: folder(),
-    };
-    let measured = tables::measure(&options, &mut |what| args.run.progress(what))?;
-    tell(
-        &args.run,
-        &measured,
-        table::tables(&measured),
-        table::tables_csv(&measured),
-    )
-}
-
-fn cores() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
-}
-
-/// The folder of further scenes.
-fn folder() -> Option<PathBuf> {
-    std::env::var_os("RAYWARD_SCENES")
-        .filter(|folder| !folder.is_empty())
-        .map(PathBuf::from)
-}
-
-/// The scenes of these names, or all.
-fn load(names: &[String], args: &MeasureArgs) -> Result<Vec<BenchScene>, Failure> {
-    let folder = folder();
-    let names: Vec<&str> = match names {
-        [] => rayward_bench::all_scenes(folder.is_some()).collect(),
-        names => names.iter().map(String::as_str).collect(),
-    };
-    let load = |name: &str| {
-        args.progress(&format!("{name}: reading"));
-        Ok(BenchScene::load(name, folder.as_deref())?)
-    };
-    names.into_iter().map(load).collect()
-}
-
-impl MeasureArgs {
-    fn progress(&self, what: &str) {
-        if !self.quiet {
-            report::note(&report::clean(what));
+impl From<Class> for RayClass {
+    fn from(class: Class) -> Self {
+        match class {
+            Class::Eye => Self::Eye,
+            Class::Hard => Self::Hard,
+            Class::Soft => Self::Soft,
+            Class::Reflection => Self::Reflection,
+            Class::Random => Self::Random,
+            Class::Through => Self::Through,
         }
     }
-}
-
-/// Writes a report in the form that was asked for.
-fn tell(args: &MeasureArgs, json: &impl serde::Serialize, text: String, csv: String) -> Result<(), Failure> {
-    if args.json {
-        return report::to_stdout_json(json);
-    }
-    let text = if args.csv { csv } else { text };
-    let lines: Vec<_> = text.lines().map(report::clean).collect();
-    report::to_stdout((lines.join("\n") + "\n").as_bytes())
-}
-
-fn judge(report: &FramesReport) -> Result<(), Failure> {
-    if report.same_pictures() {
-        return Ok(());
-    }
-    let message = format!(
-        "pictures differ in more than {} % of the pixels; the report says which",
-        report.tolerated_share * 100.0
-    );
-    Err(Failure::new(Code::Beyond, message))
-}
-
-/// A gray picture named after what it shows.
-fn write(folder: &Path, name: &str, options: &FramesOptions, picture: &Picture) -> Result<(), Failure> {
-    let plain = |c: char| {
-        if c.is_ascii_alphanumeric() || "-+.".contains(c) {
-            c
-        } else {
-            '_'
-        }
-    };
-    let file = folder.join(name.chars().map(plain).collect::<String>() + ".png");
-    std::fs::create_dir_all(folder).map_err(|source| rayward::Error::Write {
-        path: folder.into(),
-        source,
-    })?;
-    let rgb: Vec<u8> = picture.rows().iter().flat_map(|&v| [v; 3]).collect();
-    Ok(write_png(&file, options.width, options.height, &rgb)?)
 }

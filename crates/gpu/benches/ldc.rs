@@ -13,7 +13,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 use rayward_gpu::trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, StepCounts};
 use rayward_gpu::trace::{Bvh, Hit, Ldc, LdcOptions, Ray, Triangles};
-use rayward_gpu::{Cube, CubeOptions, Gpu, TraceStats};
+use rayward_gpu::{Cube, CubeOptions, Gpu, GpuBvh, TraceStats};
 use rayward_scene::{FrameGeometry, LoadOptions};
 
 fn main() {
@@ -346,6 +346,14 @@ fn on_gpu(gpu: &Gpu, triangles: Triangles, bvh: &Bvh, resolution: u32, few: &Few
     }
     let (answers, ms) = timed(|| exact.closest(&few.rays, bvh).expect("answers"));
     few.print("GPU exact", &answers, ms);
+    let sent = || GpuBvh::new(gpu, triangles, &Bvh::build(triangles)).expect("a hierarchy");
+    let (tree, tree_ms) = timed(sent);
+    println!(
+        "  GPU hierarchy: built on the CPU and sent in {tree_ms:.0} ms, MB {:.1}",
+        tree.bytes() as f64 / 1e6
+    );
+    let (answers, ms) = timed(|| tree.closest(&few.rays, bvh).expect("answers"));
+    few.print("GPU hierarchy", &answers, ms);
     for (name, hierarchy) in [
         ("GPU exact, one level", Hierarchy::Tiles { log2: [3; 2] }),
         ("GPU exact, flat", Hierarchy::Flat),

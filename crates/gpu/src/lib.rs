@@ -6,6 +6,8 @@
 //! | `commands.rs` | buffers, dispatches, reading back |
 //! | `ldc/build.rs`, `raster.wgsl` and others | triangles to a cube |
 //! | `ldc/trace.rs`, `walk.wgsl` and others | rays through a cube |
+//! | `bvh/`, `bvh.wgsl` | rays through a hierarchy, for comparison |
+//! | `batch.rs` | arrays of rays to answers, for both |
 //! | `secondary.rs` | the cube in frames of `rayward` |
 //!
 //! [`trace::ldc`] is the reference of every stage. Rays are arrays in, answers arrays out. Hits by samples are those
@@ -31,14 +33,19 @@
 //! # Ok::<(), Error>(())
 //! ```
 
+mod batch;
+mod bvh;
 mod commands;
 mod device;
 mod error;
 mod ldc;
 mod secondary;
+#[cfg(test)]
+mod test_meshes;
 
 pub use rayward_trace as trace;
 
+pub use bvh::GpuBvh;
 pub use device::{AdapterSummary, Gpu, adapters};
 pub use error::{Error, Result};
 pub use ldc::{Cube, CubeOptions, TraceStats};

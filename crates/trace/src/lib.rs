@@ -62,7 +62,7 @@ pub use area_light::AreaLight;
 pub use area_tree::{AreaCounts, AreaLightTree, AreaScratch};
 pub use bins::Binning;
 pub use brute::BruteForce;
-pub use bvh::Bvh;
+pub use bvh::{Bvh, Node as BvhNode};
 pub use clusters::Clusters;
 pub use eye_grid::{EyeCounts, EyeGrid, EyeGridOptions, Tile, TileHits};
 pub use eye_veils::{EyeVeils, TileVeils, VeilHit};

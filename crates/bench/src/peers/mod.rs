@@ -17,7 +17,7 @@ pub(crate) use obvhs::{Obvhs, ObvhsTree};
 pub(crate) use regular::RegularGrid;
 
 /// Share of a shadow ray that is cut off at both of its ends.
-const CUT: f32 = 1e-4;
+pub(crate) const CUT: f32 = 1e-4;
 
 /// A structure that is asked for packets.
 pub(crate) trait PacketTracer: Sync {

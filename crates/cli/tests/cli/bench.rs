@@ -104,7 +104,13 @@ fn scaling_and_builds_count_what_they_measure() {
             "pixels",
             "lights",
             "samples",
-            "threads"
+            "light size",
+            "depth complexity",
+            "depth complexity",
+            "threads",
+            "distance of origins",
+            "distance of origins",
+            "distance of origins",
         ]
     );
     let points = |i: usize| curves[i]["points"].as_array().expect("points");
@@ -115,7 +121,14 @@ fn scaling_and_builds_count_what_they_measure() {
     assert!(rays(0) > 0 && rays(1) > rays(0), "shadow rays for each light");
     let rays = |point: usize| points(7)[point]["rays"].as_u64().expect("a number") - 96 * 60;
     assert_eq!(rays(1), 16 * rays(0));
-    assert_eq!(points(8).len(), 2);
+    assert_eq!(points(11).len(), 2);
+    assert_eq!(points(9)[1]["triangles"], 3 * 9680);
+    let seen = |point: usize| points(10)[point]["rays"].as_u64().expect("a number");
+    assert_eq!(seen(0), seen(1), "blobs behind the first send no shadow rays");
+    for structure in 12..15 {
+        let cells = |point: usize| points(structure)[point]["steps"][0].as_f64().expect("cells");
+        assert!(cells(0) > 1.0 && cells(1) > 1.0, "{structure}");
+    }
 
     let arguments = [&["bench", "build", "blob-4k", "--json", "-q"][..], &TINY].concat();
     let report = folder.run(&arguments).expect(0).json();
@@ -133,7 +146,20 @@ fn scaling_and_builds_count_what_they_measure() {
 #[test]
 fn tables_have_all_rows_of_the_paper() {
     let folder = Folder::new();
-    let arguments = [&["bench", "tables", "--json", "-q", "--threads", "2"][..], &TINY].concat();
+    let arguments = [
+        &[
+            "bench",
+            "tables",
+            "--json",
+            "-q",
+            "--threads",
+            "2",
+            "--cubes",
+            "32,64",
+        ][..],
+        &TINY,
+    ]
+    .concat();
     let output = folder.command(&arguments).env_remove("RAYWARD_SCENES").output();
     let report = Run::from(output.expect("the program runs")).expect(0).json();
     let lines = |name: &str| report[name].as_array().expect("lines").clone();
@@ -157,6 +183,147 @@ fn tables_have_all_rows_of_the_paper() {
     assert!((0.04..0.06).contains(&covered), "{covered}");
     assert_eq!(report["steps"]["same_answers"], true);
     assert_eq!(lines("claims").len(), 12);
+    assert_eq!(lines("cubes").len(), 5 * 2);
+    for line in lines("cubes") {
+        assert_eq!(line["exact_wrong"], 0.0, "{line}");
+        assert!(line["rays"].as_u64().is_some_and(|rays| rays > 100), "{line}");
+    }
+    assert_eq!(lines("cube_claims").len(), 6);
+}
+
+#[test]
+fn without_an_improvement_the_picture_is_the_same() {
+    let folder = Folder::new();
+    let arguments = [&["bench", "ablation", "courtyard", "--json", "-q"][..], &TINY].concat();
+    let report = folder.run(&arguments).expect(0).json();
+    let frames = report["frames"].as_array().expect("frames");
+    assert_eq!(frames.len(), 3);
+    for frame in frames {
+        let rows = frame["rows"].as_array().expect("rows");
+        assert!(
+            rows.len() >= 3 && rows[0]["contender"] == "all improvements",
+            "{frame}"
+        );
+        for row in rows {
+            assert_eq!(row["differing_pixels"], 0, "{row}");
+            assert!(
+                row["over_rayward"].as_f64().is_some_and(|ratio| ratio > 0.0),
+                "{row}"
+            );
+        }
+    }
+}
+
+#[test]
+fn structures_answer_all_rays_alike() {
+    let folder = Folder::new();
+    let base = [
+        "bench",
+        "structures",
+        "blob-1k",
+        "--number",
+        "600",
+        "--cube",
+        "32",
+        "--runs",
+        "1",
+        "-q",
+    ];
+    let report = folder.run(&[&base[..], &["--json"]].concat()).expect(0).json();
+    let scene = &report["scenes"][0];
+    let classes = scene["classes"].as_array().expect("classes");
+    let names: Vec<_> = classes.iter().filter_map(|c| c["class"].as_str()).collect();
+    assert_eq!(names, ["eye", "hard", "soft", "reflection", "random", "through"]);
+    for class in classes {
+        let rows = class["rows"].as_array().expect("rows");
+        let who: Vec<_> = rows.iter().filter_map(|row| row["structure"].as_str()).collect();
+        assert!(
+            who[0] == "bvh" && who.contains(&"regular grid") && who.contains(&"cube"),
+            "{who:?}"
+        );
+        let own = match class["class"].as_str() {
+            Some("eye") => "eye grid",
+            Some("hard") => "lit pixels",
+            Some("soft") => "area tree",
+            _ => "perspective grids, eye",
+        };
+        assert!(who.contains(&own), "{who:?}");
+        for row in rows {
+            let by_design = row["structure"] == "cube, planes of samples";
+            let of_others = row["structure"]
+                .as_str()
+                .is_some_and(|name| name.contains("obvhs"));
+            assert!(by_design || of_others || row["differing"] == 0, "{row}");
+            assert!(
+                row["hits"].as_u64() > Some(0) && row["ns_per_ray"].is_number(),
+                "{row}"
+            );
+        }
+    }
+    let csv = folder
+        .run(&[&base[..], &["--csv", "--rays", "random"]].concat())
+        .expect(0);
+    let csv = String::from_utf8(csv.stdout).expect("text");
+    assert!(csv.starts_with("scene,triangles,class,structure") && csv.contains("\nblob-1k,980,random,bvh,"));
+}
+
+#[test]
+fn a_report_is_a_page_that_needs_nothing_beside_it() {
+    let folder = Folder::new();
+    let arguments = [
+        "bench",
+        "all",
+        "--quick",
+        "--runs",
+        "1",
+        "--threads",
+        "1",
+        "-q",
+        "--report",
+        "out",
+    ];
+    let run = folder
+        .command(&arguments)
+        .env_remove("RAYWARD_SCENES")
+        .output()
+        .expect("the program runs");
+    let run = Run::from(run).expect(0);
+    let text = String::from_utf8(run.stdout).expect("text");
+    assert!(text.contains("What falls short"), "{text}");
+    let read = |name: &str| std::fs::read_to_string(folder.path("out").join(name)).expect("a file");
+    let page = read("index.html");
+    let first = page.find("What falls short").expect("a section");
+    assert!(first < page.find("HM08, Table 1").expect("a section"));
+    assert!(page.contains("<svg") && page.contains("data:image/png;base64,") && page.ends_with("</html>"));
+    let outside = ["src=\"http", "href=\"http", "<script", "<link"];
+    assert!(outside.iter().all(|mark| !page.contains(mark)));
+    let markdown = read("report.md");
+    let shown = markdown
+        .split("](")
+        .skip(1)
+        .filter_map(|rest| rest.split_once(')'));
+    let mut files = 0;
+    for (file, _) in shown {
+        assert!(folder.path("out").join(file).is_file(), "{file}");
+        files += 1;
+    }
+    assert!(files > 10, "{markdown}");
+    folder.file("taken", "");
+    folder
+        .run(&[
+            "bench",
+            "build",
+            "blob-1k",
+            "--resolution",
+            "32x20",
+            "--runs",
+            "1",
+            "-q",
+            "--report",
+            "taken",
+        ])
+        .expect(1)
+        .says(&["taken"]);
 }
 
 #[test]

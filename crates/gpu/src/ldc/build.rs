@@ -60,7 +60,7 @@ impl<'a> Cube<'a> {
 }
 
 /// Ids of the triangles that take part.
-fn usable(triangles: &Triangles) -> (Vec<u32>, BuildStats) {
+pub(crate) fn usable(triangles: &Triangles) -> (Vec<u32>, BuildStats) {
     let all = || (0..triangles.len() as u32).into_par_iter();
     let prims: Vec<u32> = all().filter(|&p| !triangles.is_degenerate(p)).collect();
     let infinite = all()
@@ -101,7 +101,7 @@ impl Size {
     }
 }
 
-fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions) -> (Frame, u64) {
+pub(crate) fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions) -> (Frame, u64) {
     let raster = |axis: usize| [frame.size[(axis + 1) % 3], frame.size[(axis + 2) % 3]];
     let shifts: Vec<[u32; 2]> = match options.hierarchy {
         Hierarchy::Flat => Vec::new(),
@@ -132,6 +132,27 @@ fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions) -> (Frame,
         cells,
     };
     (layout, u64::from(first_cell))
+}
+
+/// Vertices in texel coordinates, and the corners of all triangles.
+pub(crate) fn upload(
+    gpu: &Gpu,
+    frame: &CubeFrame,
+    triangles: &Triangles,
+    prims: &[u32],
+) -> Result<[Buffer; 2]> {
+    let positions: Vec<[f32; 3]> = (0..triangles.x.len() as u32)
+        .into_par_iter()
+        .map(|i| frame.texel(triangles.vertex(i).as_dvec3()).as_vec3().to_array())
+        .collect();
+    let mut indices = vec![[u32::MAX; 3]; triangles.len()];
+    for &prim in prims {
+        indices[prim as usize] = triangles.indices[prim as usize];
+    }
+    Ok([
+        gpu.uploaded("vertices", &positions)?,
+        gpu.uploaded("triangles", &indices)?,
+    ])
 }
 
 /// A build at one resolution, under way.
@@ -165,15 +186,7 @@ impl<'a> Stage<'a> {
                 limit: MAX_ROWS as u64,
             });
         }
-        let vertices = triangles.x.len() as u32;
-        let positions: Vec<[f32; 3]> = (0..vertices)
-            .into_par_iter()
-            .map(|i| frame.texel(triangles.vertex(i).as_dvec3()).as_vec3().to_array())
-            .collect();
-        let mut indices = vec![[u32::MAX; 3]; triangles.len()];
-        for &prim in prims {
-            indices[prim as usize] = triangles.indices[prim as usize];
-        }
+        let [positions, indices] = upload(gpu, frame, &triangles, prims)?;
         let (layout, cells) = layout(frame, triangles.len(), options);
         let texels = u64::from(layout.first_texel[3]);
         Ok(Self {
@@ -183,8 +196,8 @@ impl<'a> Stage<'a> {
             cells,
             rows: size.rows as u64,
             frame: gpu.uniform("the cube's layout", &layout)?,
-            positions: gpu.uploaded("vertices", &positions)?,
-            indices: gpu.uploaded("triangles", &indices)?,
+            positions,
+            indices,
             row_starts: gpu.storage("rows of triangles", 4 * (triangles.len() as u64 + 1))?,
             starts: gpu.storage("the cube's texels", 4 * (texels + 1))?,
         })

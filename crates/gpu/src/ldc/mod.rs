@@ -11,7 +11,7 @@
 //! quarter and so on. Cost: a sweep costs what its samples do; a ray some hundred steps. Limits: resolution up to
 //! 2048, where f32 texel coordinates still resolve 1/8192 of a texel.
 
-mod build;
+pub(crate) mod build;
 pub(crate) mod layout;
 pub(crate) mod shaders;
 #[cfg(test)]

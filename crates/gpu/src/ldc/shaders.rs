@@ -35,6 +35,7 @@ pub(crate) const SAMPLED: Program = Program {
     name: "sampled.wgsl",
     source: concat!(
         include_str!("common.wgsl"),
+        include_str!("query.wgsl"),
         include_str!("walk.wgsl"),
         include_str!("sampled.wgsl"),
     ),
@@ -44,14 +45,26 @@ pub(crate) const EXACT: Program = Program {
     name: "exact.wgsl",
     source: concat!(
         include_str!("common.wgsl"),
+        include_str!("query.wgsl"),
+        include_str!("meet.wgsl"),
         include_str!("walk.wgsl"),
         include_str!("exact.wgsl"),
     ),
 };
 
+pub(crate) const TREE: Program = Program {
+    name: "bvh.wgsl",
+    source: concat!(
+        include_str!("common.wgsl"),
+        include_str!("query.wgsl"),
+        include_str!("meet.wgsl"),
+        include_str!("../bvh/bvh.wgsl"),
+    ),
+};
+
 /// All programs.
 #[cfg(test)]
-pub(crate) const ALL: [&Program; 6] = [&RASTER, &SCAN, &SORT, &LEVELS, &SAMPLED, &EXACT];
+pub(crate) const ALL: [&Program; 7] = [&RASTER, &SCAN, &SORT, &LEVELS, &SAMPLED, &EXACT, &TREE];
 
 #[cfg(test)]
 mod tests {
@@ -60,6 +73,7 @@ mod tests {
     use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
     use super::*;
+    use crate::bvh::Node;
     use crate::ldc::layout::{Found, Frame, Query, Raise, Scan, TexelRay};
 
     fn parsed(program: &Program) -> (naga::Module, ModuleInfo) {
@@ -171,8 +185,11 @@ mod tests {
             cells
         );
         same_layout!(SCAN, "Scan", Scan, count, blocks, pad);
+        same_layout!(
+            TREE, "Node", Node, low_x, high_x, low_y, high_y, low_z, high_z, first, count
+        );
         same_layout!(LEVELS, "Raise", Raise, axis, level, rows, rows_below);
-        for program in [SAMPLED, EXACT] {
+        for program in [SAMPLED, EXACT, TREE] {
             same_layout!(
                 program, "Ray", TexelRay, origin, end, dir, t_min, t_max, before, skip, pad
             );

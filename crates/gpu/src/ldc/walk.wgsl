@@ -2,58 +2,9 @@
 // f32. Positions are whole texels and a cell's exit is computed from its edge, so a walk always advances and ends. It
 // visits the texels of a line within 2^-10 of a texel of the true one.
 
-// 48 bytes. In texel coordinates; the largest component of `dir` is 1 or -1, so `t` counts texels.
-struct Ray {
-    // Where the ray is within the cube first.
-    origin: vec3f,
-    // Where it leaves the cube.
-    end: f32,
-    dir: vec3f,
-    // Hits at or before it do not count.
-    t_min: f32,
-    // Hits beyond it do not count.
-    t_max: f32,
-    // From the ray's true origin to `origin`, at least 0.
-    before: f32,
-    // A triangle that is not hit.
-    skip: u32,
-    pad: u32,
-}
-
-// 32 bytes.
-struct Found {
-    t: f32,
-    prim: u32,
-    // MISS, HIT or UNSURE.
-    state: u32,
-    cells: u32,
-    texels: u32,
-    samples: u32,
-    triangles: u32,
-    pad: u32,
-}
-
-struct Query {
-    rays: u32,
-    // Of hits by samples: STRICT, INTERVAL or PLANE.
-    test: u32,
-    // Its tolerance or margin.
-    tolerance: f32,
-    // 1 if any hit will do.
-    any: u32,
-}
-
-const MISS: u32 = 0u;
-const HIT: u32 = 1u;
-const UNSURE: u32 = 2u;
-const FAR: f32 = 1e30;
-
 @group(0) @binding(3) var<storage, read> starts: array<u32>;
 @group(0) @binding(4) var<storage, read> samples: array<u32>;
 @group(0) @binding(5) var<storage, read> cells: array<u32>;
-@group(0) @binding(6) var<storage, read> rays: array<Ray>;
-@group(0) @binding(7) var<storage, read_write> found: array<Found>;
-@group(0) @binding(8) var<uniform> query: Query;
 
 struct Walk {
     axis: u32,

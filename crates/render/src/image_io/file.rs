@@ -107,6 +107,14 @@ fn write_inner(path: &Path, encode: impl FnOnce(&mut dyn Sink) -> io::Result<()>
     begun.put_in_place(target)
 }
 
+/// Writes a file of these bytes. An existing file is replaced only when all is written.
+///
+/// # Errors
+/// [`Error::Write`](crate::Error::Write), naming the file.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
+    write(path, |sink| sink.write_all(bytes))
+}
+
 /// As [`write`], for a file that another process fills: `make` gets the path of an empty file of the same ending.
 pub(super) fn write_by_path(path: &Path, make: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
     let write = || {

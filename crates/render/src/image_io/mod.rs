@@ -24,7 +24,7 @@ mod picture;
 mod png;
 
 pub use exr::{encode_exr, write_exr};
-pub use file::{Discarded, discard_unfinished};
+pub use file::{Discarded, discard_unfinished, write_bytes};
 pub use movie::{MovieOptions, is_movie, write_movie};
 pub use npy::{encode_npy, write_npy};
 pub use picture::{Picture, read_picture, read_picture_up_to};

@@ -23,6 +23,7 @@ use crate::brute::{hit_in_range, rounded, write_sorted};
 use crate::exact::{self, ExactHit, Filter};
 use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles, ViewRay};
 use build::{Built, Leaf};
+pub use node::Node;
 use node::{INNER, WIDTH};
 use slab::Slab;
 
@@ -30,7 +31,7 @@ use slab::Slab;
 #[derive(Clone, Debug)]
 pub struct Bvh<'a> {
     triangles: Triangles<'a>,
-    nodes: Vec<node::Node>,
+    nodes: Vec<Node>,
     leaves: Vec<Leaf>,
     stack: usize,
     reach: f64,
@@ -68,6 +69,21 @@ impl<'a> Bvh<'a> {
     /// Memory of the hierarchy in bytes, the triangles themselves left out.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.leaves)
+    }
+
+    /// Its nodes, the root first, for tracers elsewhere; none without triangles.
+    pub fn nodes(&self) -> &[Node] {
+        &self.nodes
+    }
+
+    /// Triangle ids in the order of the leaves.
+    pub fn leaf_prims(&self) -> impl ExactSizeIterator<Item = u32> + '_ {
+        self.leaves.iter().map(|leaf| leaf.prim)
+    }
+
+    /// Entries that the stack of a traversal can ever need.
+    pub fn stack(&self) -> usize {
+        self.stack
     }
 
     /// [`Accel::intersect`] in f64, counting the work.

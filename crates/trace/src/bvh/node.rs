@@ -9,12 +9,13 @@ pub(super) const WIDTH: usize = 4;
 /// and no triangles.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(super) struct Node {
+pub struct Node {
     /// Axis, lower and upper face, child.
-    pub(super) bounds: [[[f32; WIDTH]; 2]; 3],
-    pub(super) first: [u32; WIDTH],
-    /// Triangles of the child, or [`INNER`].
-    pub(super) count: [u32; WIDTH],
+    pub bounds: [[[f32; WIDTH]; 2]; 3],
+    /// Index of a node, or of the first of the child's triangles.
+    pub first: [u32; WIDTH],
+    /// Triangles of the child; `u32::MAX` for a node.
+    pub count: [u32; WIDTH],
 }
 
 /// The count that marks a child that is itself a node.

@@ -1,0 +1,160 @@
+//! What each improvement brings: frames with one of them taken away, and in the papers' ways, beside the usual ones.
+//!
+//! All ways draw the same picture, which is compared; times are taken in turns. A way that is slower by a factor says what
+//! the improvement is worth in that scene.
+
+use rayward::CasterPolicy;
+use rayward::trace::{Binning, EyeGridOptions, FaceOptions, LightGridOptions, SimdLevel};
+
+use crate::contender::{FrameKind, Job};
+use crate::frames::{Drawer, FramesReport, TOLERATED_SHARE, measure_frame};
+use crate::ours::{Rayward, Ways};
+use crate::{BenchScene, Machine, Result};
+
+/// What is measured.
+#[derive(Clone, Debug)]
+pub struct AblationOptions {
+    /// Width in pixels.
+    pub width: u32,
+    /// Height in pixels.
+    pub height: u32,
+    /// Threads.
+    pub threads: usize,
+    /// Runs of each way.
+    pub runs: usize,
+    /// Instruction set of our kernels.
+    pub level: SimdLevel,
+}
+
+/// Built-in scenes that are measured unless others are asked for.
+pub const SCENES: [&str; 3] = ["blob-69k", "courtyard", "conference"];
+
+/// Measures these scenes in all ways; the first row of each frame has the usual ones.
+///
+/// # Errors
+/// [`crate::Error`], if a camera cannot be taken or threads not be started.
+pub fn measure(
+    scenes: &[BenchScene],
+    options: &AblationOptions,
+    progress: &mut dyn FnMut(&str),
+) -> Result<FramesReport> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()?;
+    let mut report = FramesReport {
+        machine: Machine::describe(options.level, options.threads),
+        embree: Vec::new(),
+        width: options.width,
+        height: options.height,
+        runs: options.runs,
+        tolerated_share: TOLERATED_SHARE,
+        frames: Vec::new(),
+    };
+    for kind in FrameKind::ALL {
+        let ways: Vec<Box<Drawer>> = ways(kind)
+            .into_iter()
+            .map(|ways| Box::new(Rayward::new(ways)) as Box<Drawer>)
+            .collect();
+        for scene in scenes {
+            progress(&format!("{}: {}", scene.name, kind.name()));
+            let job = Job::new(scene, [options.width, options.height], kind, options.level)?;
+            let frame = pool.install(|| measure_frame(&job, &ways, options.runs, &mut |_, _| ()));
+            report.frames.push(frame);
+        }
+    }
+    Ok(report)
+}
+
+/// The ways of one kind of frame, the usual one first.
+fn ways(kind: FrameKind) -> Vec<Ways> {
+    let usual = Ways::usual();
+    let named = |name, ways: Ways| Ways { name, ..ways };
+    // All contenders write pictures in tiles of one size; that is all that is not the paper's.
+    let as_in_the_paper = EyeGridOptions {
+        tile: usual.eye.tile,
+        ..EyeGridOptions::paper()
+    };
+    let mut all = vec![named("all improvements", usual)];
+    match kind {
+        FrameKind::Eye => {
+            let eye = |name, eye, clusters| Ways {
+                name,
+                eye,
+                clusters,
+                ..usual
+            };
+            let hides_nothing = EyeGridOptions {
+                hierarchy: false,
+                ..usual.eye
+            };
+            let by_rectangle = EyeGridOptions {
+                binning: Binning::Rectangle,
+                ..usual.eye
+            };
+            all.extend([
+                eye("no clusters", usual.eye, false),
+                eye("nothing hides anything", hides_nothing, true),
+                eye("binned by rectangle", by_rectangle, true),
+                eye("HM08's way", as_in_the_paper, false),
+            ]);
+        }
+        FrameKind::EyeHard => {
+            let both = CasterPolicy::Both;
+            let looked_up = Some(LightGridOptions::default());
+            let paper = Ways {
+                eye: as_in_the_paper,
+                clusters: false,
+                looked_up: Some(LightGridOptions::paper()),
+                ..usual
+            };
+            all.extend([
+                named(
+                    "both sides cast",
+                    Ways {
+                        casters: both,
+                        ..usual
+                    },
+                ),
+                named("looked up in a grid", Ways { looked_up, ..usual }),
+                named(
+                    "memory made anew",
+                    Ways {
+                        keeps_memory: false,
+                        ..usual
+                    },
+                ),
+                named("HM08's way", paper),
+            ]);
+        }
+        FrameKind::EyeSoft => {
+            let paper = FaceOptions {
+                resolution: Some([200, 200, 4]),
+                uniform_depth: true,
+                ..FaceOptions::default()
+            };
+            all.extend([
+                named(
+                    "no sheets",
+                    Ways {
+                        sheets: false,
+                        ..usual
+                    },
+                ),
+                named(
+                    "HM08's grid, ray by ray",
+                    Ways {
+                        followed: Some(paper),
+                        ..usual
+                    },
+                ),
+            ]);
+        }
+    }
+    let levels = SimdLevel::available();
+    let narrower = levels.get(1..).unwrap_or_default().iter();
+    all.extend(narrower.map(|&level| Ways {
+        level: Some(level),
+        ..named(level.name(), usual)
+    }));
+    all
+}

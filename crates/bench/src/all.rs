@@ -1,0 +1,270 @@
+//! Everything in one report: frames, the papers' tables, curves, ablations, structures, builds.
+//!
+//! What falls short comes first.
+
+use rayward::trace::SimdLevel;
+use rayward::{RenderOptions, Renderer, ToneMap, ToneMapper, image_io, scene};
+use serde::Serialize;
+
+use crate::ablation::{self, AblationOptions};
+use crate::build::{self, BuildOptions, BuildReport};
+use crate::claims::{Claim, Verdict};
+use crate::frames::{self, FramesOptions, FramesReport};
+use crate::report::{Document, Item, Picture, Section, sections};
+use crate::scaling::{self, ScalingOptions, ScalingReport};
+use crate::structures::{self, RayClass, StructuresOptions, StructuresReport};
+use crate::table::number;
+use crate::tables::{self, TablesOptions, TablesReport};
+use crate::{BenchScene, Machine, Result};
+
+/// How much is measured.
+#[derive(Clone, Debug)]
+pub struct AllOptions {
+    /// Small sizes, for a look and for tests.
+    pub quick: bool,
+    /// Threads of what is measured with several.
+    pub threads: usize,
+    /// Runs of each measurement.
+    pub runs: usize,
+    /// Instruction set of our kernels.
+    pub level: SimdLevel,
+    /// Folder of scenes, with a camera file.
+    pub folder: Option<std::path::PathBuf>,
+}
+
+/// All measurements.
+#[derive(Clone, Debug, Serialize)]
+pub struct AllReport {
+    /// Frames beside others.
+    pub frames: FramesReport,
+    /// The papers' tables.
+    pub tables: TablesReport,
+    /// Costs of a ray.
+    pub scaling: ScalingReport,
+    /// Builds and threads.
+    pub build: BuildReport,
+    /// Improvements taken away.
+    pub ablation: FramesReport,
+    /// Structures for any ray.
+    pub structures: StructuresReport,
+    /// Pictures of what was measured.
+    #[serde(skip)]
+    pub pictures: Vec<Picture>,
+}
+
+/// Ratios to the fastest other ray tracer that Rayward is made for, by kind of frame.
+const BARS: [(&str, f64); 3] = [("eye", 5.0), ("eye+hard", 2.5), ("eye+soft8", 3.0)];
+
+/// Measures everything.
+///
+/// # Errors
+/// [`crate::Error`], if a scene cannot be read, Embree not be used, or threads not be started.
+pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<AllReport> {
+    let &AllOptions {
+        quick,
+        threads,
+        runs,
+        level,
+        ..
+    } = options;
+    let folder = options.folder.as_deref();
+    let [width, height] = if quick { [96, 60] } else { [1920, 1200] };
+    let load = |names: &[&str]| -> Result<Vec<BenchScene>> {
+        names.iter().map(|name| BenchScene::load(name, folder)).collect()
+    };
+    let names: Vec<&str> = match (quick, folder) {
+        (true, _) => vec!["blob-1k"],
+        (false, None) => crate::all_scenes(false).collect(),
+        (false, Some(_)) => crate::all_scenes(true)
+            .filter(|name| !scene::builtin::NAMES.contains(name))
+            .collect(),
+    };
+    let scenes = load(&names)?;
+    let frames = FramesOptions {
+        width,
+        height,
+        runs,
+        level,
+        ..FramesOptions::default()
+    };
+    let few: &[&str] = if quick { &["blob-1k"] } else { &ablation::SCENES };
+    let some = load(few)?;
+    Ok(AllReport {
+        frames: frames::measure(&scenes, &frames, progress, &mut |_, _| ())?,
+        build: build::measure(
+            &scenes,
+            &BuildOptions {
+                width,
+                height,
+                threads,
+                runs,
+                level,
+            },
+            progress,
+        )?,
+        tables: tables::measure(
+            &TablesOptions {
+                size: [width, height],
+                threads,
+                runs,
+                level,
+                cubes: if quick { vec![32, 64] } else { vec![512, 1024] },
+                folder: options.folder.clone().filter(|_| !quick),
+            },
+            progress,
+        )?,
+        ablation: ablation::measure(
+            &some,
+            &AblationOptions {
+                width: width / 2,
+                height: height / 2,
+                threads: 1,
+                runs,
+                level,
+            },
+            progress,
+        )?,
+        structures: structures::measure(
+            &some,
+            &StructuresOptions {
+                rays: if quick { 500 } else { 100_000 },
+                classes: RayClass::ALL.to_vec(),
+                runs,
+                cube: if quick { 32 } else { 512 },
+                level,
+                peers: true,
+            },
+            progress,
+        )?,
+        scaling: scaling::measure(
+            &ScalingOptions {
+                quick,
+                threads,
+                runs,
+                level,
+            },
+            progress,
+        )?,
+        pictures: pictures(quick, progress)?,
+    })
+}
+
+/// Small pictures of some built-in scenes.
+fn pictures(quick: bool, progress: &mut dyn FnMut(&str)) -> Result<Vec<Picture>> {
+    let [width, height] = if quick { [32, 20] } else { [480, 300] };
+    let picture = |name: &&str| {
+        progress(&format!("picture of {name}"));
+        let scene = scene::builtin::build(name)?;
+        let frame = scene.at(0.0);
+        let options = RenderOptions {
+            width,
+            height,
+            pixel_samples: 4,
+            ..RenderOptions::default()
+        };
+        let rendered =
+            Renderer::new(&scene).render(&frame, &frame.cameras[0], &frame.lights, &options, &|_| {})?;
+        let rgb = ToneMapper::new(ToneMap::None).encode(&rendered.film);
+        let mut png = Vec::new();
+        image_io::encode_png(&mut png, width, height, &rgb)?;
+        Ok(Picture {
+            name: (*name).into(),
+            caption: format!("{name}, {} triangles", frame.triangle_count()),
+            png,
+        })
+    };
+    ["courtyard", "forest", "conference", "teapot-mirror"]
+        .iter()
+        .map(picture)
+        .collect()
+}
+
+impl AllReport {
+    /// The whole report.
+    pub fn sections(&self) -> Vec<Section> {
+        let mut pictures = Section::new("Some of the scenes");
+        pictures
+            .items
+            .extend(self.pictures.iter().cloned().map(Item::Picture));
+        let mut all = vec![self.overview()];
+        let mut frames = sections::frames(&self.frames).into_iter();
+        all.extend(frames.next());
+        all.extend(sections::tables(&self.tables));
+        all.extend(sections::build(&self.build));
+        all.extend(sections::scaling(&self.scaling));
+        all.extend(sections::ablation(&self.ablation));
+        all.extend(sections::structures(&self.structures));
+        all.push(pictures);
+        all.extend(frames);
+        all
+    }
+
+    /// What falls short of the papers, of others and of what was set out for, then what does not.
+    fn overview(&self) -> Section {
+        let (mut short, mut met) = (Vec::new(), Vec::new());
+        for (kind, bar) in BARS {
+            let frames = self.frames.frames.iter().filter(|frame| frame.frame == kind);
+            let ratios: Vec<(f64, &str)> = frames
+                .filter_map(|frame| Some((frame.ratio?, frame.scene.as_str())))
+                .collect();
+            let below: Vec<_> = ratios.iter().filter(|(ratio, _)| *ratio < bar).collect();
+            let told = |ratios: &[&(f64, &str)]| {
+                let each: Vec<_> = ratios
+                    .iter()
+                    .map(|(ratio, scene)| format!("{} {scene}", number(*ratio)))
+                    .collect();
+                each.join(", ")
+            };
+            if !below.is_empty() {
+                short.push(format!(
+                    "{kind}: {bar} times the fastest other ray tracer was set out for; in {} of {} scenes it is less: {}.",
+                    below.len(),
+                    ratios.len(),
+                    told(&below)
+                ));
+            }
+            let above: Vec<_> = ratios.iter().filter(|(ratio, _)| *ratio >= bar).collect();
+            if !above.is_empty() {
+                met.push(format!(
+                    "{kind}, at least {bar} times the fastest: {}.",
+                    told(&above)
+                ));
+            }
+        }
+        let claims = |paper: &str, claims: &[Claim], short: &mut Vec<String>, met: &mut Vec<String>| {
+            for claim in claims {
+                let line = format!("{paper}, \"{}\": {}.", claim.claim, claim.figures);
+                match claim.verdict {
+                    Verdict::Not => short.push(line),
+                    Verdict::Exceeded => met.push(line),
+                    Verdict::Reproduced | Verdict::NotMeasured => {}
+                }
+            }
+        };
+        claims("HM08", &self.tables.claims, &mut short, &mut met);
+        claims("VMV07", &self.tables.cube_claims, &mut short, &mut met);
+        if short.is_empty() {
+            short.push("Nothing that was measured.".into());
+        }
+        let mut section = Section::new("What falls short").list(short);
+        if !met.is_empty() {
+            section = section
+                .text("What goes beyond the papers, or reaches what was set out for:")
+                .list(met);
+        }
+        section
+    }
+
+    /// As a document.
+    pub fn document(&self, command: String) -> Document {
+        Document {
+            title: "Rayward: measurements".into(),
+            machine: Machine {
+                threads: self.build.machine.threads,
+                ..self.frames.machine.clone()
+            },
+            command,
+            sections: self.sections(),
+        }
+    }
+}
