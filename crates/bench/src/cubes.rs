@@ -148,9 +148,11 @@ pub(crate) fn table(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> 
             line.paper_scene = paper.name;
             line.paper_ktriangles = paper.ktriangles;
             line.paper_layers = paper.layers;
-            line.paper_ms = [512, 1024]
-                .contains(&resolution)
-                .then_some(paper.ms[place.min(1)]);
+            line.paper_ms = match resolution {
+                512 => Some(paper.ms[0]),
+                1024 => Some(paper.ms[1]),
+                _ => None,
+            };
             lines.push(line);
         }
     }
