@@ -14,9 +14,11 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::grid3::{Outline, Partition, RaySpan, SpaceGrid, Walk, fitting, reaches_cube};
-use crate::space::{Face, FaceIntervals, Perspective};
+use crate::grid3::{Mailbox, Outline, Partition, RaySpan, SpaceGrid, Walk, fitting, reaches_cube};
+use crate::space::{Face, FaceIntervals, Perspective, Space};
 use crate::{Count, ViewRay};
+
+pub(crate) use crate::grid3::PACKET;
 
 /// By how much the pyramids are wider than 90 degrees, and the cube for the near list larger than that of the spaces.
 const GUARD: f64 = 1.0 / 1024.0;
@@ -93,7 +95,7 @@ impl FaceGrids {
         }));
         let inner = (!options.uniform_depth).then(|| survey.depth_planes(near, far, resolution[2]));
         let build = |space: &Perspective| {
-            let partition = Partition::new(crate::space::Space::limits(space), resolution, inner.as_deref());
+            let partition = Partition::new(space.limits(), resolution, inner.as_deref());
             let grid = SpaceGrid::build(*space, partition, items, &outline);
             (grid.cells.reference_count() > 0).then_some(grid)
         };
@@ -138,6 +140,45 @@ impl FaceGrids {
             }
         }
         ControlFlow::Continue(())
+    }
+
+    /// Visits the items that the live ones of four rays may meet with a parameter in `range`, cells around all of them at
+    /// once; `visit` takes rays that are done out of the live ones. Rays that are not finite have to be among the dead.
+    pub(crate) fn each_of_packet(
+        &self,
+        rays: &[ViewRay; PACKET],
+        range: [f64; 2],
+        live: &mut u32,
+        count: &mut impl Count,
+        mut visit: impl FnMut(u32, &mut u32),
+    ) {
+        let range = RaySpan::new(range).range();
+        let lanes = |live: u32| (0..PACKET).filter(move |lane| live >> lane & 1 != 0);
+        let largest = lanes(*live).map(|lane| rays[lane].origin.abs().max_element());
+        let largest = largest.fold(0.0, f64::max);
+        if !self.resolves(self.magnitude + largest) {
+            return (0..self.items).for_each(|item| visit(item, live));
+        }
+        let mut mailbox = Mailbox::new();
+        if !self.near_items.is_empty() && lanes(*live).any(|lane| self.enters_cube(&rays[lane], range)) {
+            count.node();
+            for &item in &self.near_items {
+                if mailbox.is_new(item) {
+                    visit(item, live);
+                }
+            }
+        }
+        for (grid, space) in self.faces.iter().zip(&self.spaces) {
+            let Some(grid) = grid else { continue };
+            let segment = |lane: usize| {
+                let asked = *live >> lane & 1 != 0;
+                asked.then(|| space.segment(&rays[lane], range)).flatten()
+            };
+            let segments: [_; PACKET] = std::array::from_fn(segment);
+            if segments.iter().any(Option::is_some) {
+                grid.slices(&segments, live, &mut mailbox, count, &mut visit);
+            }
+        }
     }
 
     /// Whether the ray comes near the cube in which the spaces end.
@@ -187,6 +228,20 @@ impl FaceGrids {
     pub(crate) fn bytes(&self) -> usize {
         let cells = self.faces.iter().flatten().map(|grid| grid.cells.bytes());
         cells.sum::<usize>() + self.near_items.capacity() * 4
+    }
+}
+
+/// Visits items 0 .. `items` without any structure.
+pub(crate) fn each_of(
+    items: u32,
+    ray: &ViewRay,
+    range: [f64; 2],
+    count: &mut impl Count,
+    mut visit: impl FnMut(u32, &mut RaySpan) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    match Walk::new(ray, range) {
+        Some(mut walk) => walk.visit(0..items, count, &mut visit),
+        None => ControlFlow::Continue(()),
     }
 }
 

@@ -8,7 +8,9 @@
 //! | rays that nearly share an origin, and any other | [`PerspectiveGrids`] | HM08 §5.3 |
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | soft shadow rays of one light | [`AreaLightTree`] | HM08 §5.3, in a hierarchy |
-//! | any ray, at spheres, cylinders, capsules and what is made of them | [`solids::SolidGrids`] | HM08 §3 |
+//! | the same as in the paper | [`AreaLightGrid`] | HM08 §5.3 |
+//! | any ray, at spheres, cylinders, capsules, boxes and what is made of them | [`solids::SolidGrids`] | HM08 §3 |
+//! | eye rays of one camera at such solids | [`solids::EyeSolids`] | HM08 §5.1 |
 //! | eye rays through masked and blended triangles | [`EyeVeils`] | HM08 §5.1 |
 //! | shadow rays through them | [`PointLightGrid::each_between`] | HM08 §5.2 |
 //! | any ray | [`Bvh`] | general hierarchy |
@@ -23,6 +25,7 @@
 //! Positions are f32 in one local frame (the caller keeps its f64 origin). Units are the caller's.
 
 mod accel;
+mod area_grid;
 mod area_light;
 mod area_tree;
 mod bins;
@@ -58,6 +61,7 @@ pub mod view;
 mod visibility;
 
 pub use accel::{Accel, BuildStats, Count, Counters};
+pub use area_grid::AreaLightGrid;
 pub use area_light::AreaLight;
 pub use area_tree::{AreaCounts, AreaLightTree, AreaScratch};
 pub use bins::Binning;

@@ -18,7 +18,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
 
-use crate::faces::{FaceGrids, FaceOptions};
+use crate::faces::{FaceGrids, FaceOptions, each_of};
 use crate::grid3::{Outline, RaySpan};
 use crate::queries::{self, Candidates};
 use crate::{Accel, Count, Hit, Light, Ray, Receiver, Triangles, ViewRay};
@@ -28,6 +28,8 @@ use crate::{Accel, Count, Hit, Light, Ray, Receiver, Triangles, ViewRay};
 pub struct MovingTriangles<'a> {
     open: Triangles<'a>,
     close: Triangles<'a>,
+    /// Whether both are the same arrays, so that nothing moves.
+    still: bool,
 }
 
 /// Vertices of one time, as [`Triangles`] take them.
@@ -56,12 +58,17 @@ impl<'a> MovingTriangles<'a> {
             open.indices == close.indices && open.x.len() == close.x.len(),
             "the triangles of the two times differ"
         );
-        Self { open, close }
+        let same = |a: &[f32], b: &[f32]| std::ptr::eq(a, b);
+        let still = same(open.x, close.x) && same(open.y, close.y) && same(open.z, close.z);
+        Self { open, close, still }
     }
 
     /// The corners of a triangle at a time from 0 to 1.
     #[inline]
     pub fn corners(&self, prim: u32, time: f64) -> [Vec3; 3] {
+        if self.still {
+            return self.open.corners(prim);
+        }
         let (open, close) = (self.open.corners(prim), self.close.corners(prim));
         [0, 1, 2].map(|i| {
             let axis = |axis: usize| between(open[i][axis], close[i][axis], time);
@@ -84,7 +91,8 @@ impl<'a> MovingTriangles<'a> {
 
     /// Whether any vertex moves.
     pub fn any_moves(&self) -> bool {
-        self.open.x != self.close.x || self.open.y != self.close.y || self.open.z != self.close.z
+        !self.still
+            && (self.open.x != self.close.x || self.open.y != self.close.y || self.open.z != self.close.z)
     }
 
     /// What holds a triangle from one time to another: coordinates only grow or only fall in between.
@@ -108,7 +116,7 @@ impl<'a> MovingTriangles<'a> {
 #[derive(Clone, Debug)]
 pub struct MovingGrids<'a> {
     triangles: MovingTriangles<'a>,
-    /// One for each slice of the shutter.
+    /// One for each slice of the shutter; none if every triangle is tested.
     slices: Vec<FaceGrids>,
 }
 
@@ -130,6 +138,14 @@ impl<'a> MovingGrids<'a> {
         }
     }
 
+    /// No grids: every ray is tested with every triangle by the exact decision alone, the definition of the right answer.
+    pub fn every(triangles: MovingTriangles<'a>) -> Self {
+        Self {
+            triangles,
+            slices: Vec::new(),
+        }
+    }
+
     /// The triangles at a time from 0 to 1.
     pub fn at(&self, time: f64) -> MovingAt<'_> {
         let time = time.clamp(0.0, 1.0);
@@ -140,7 +156,7 @@ impl<'a> MovingGrids<'a> {
             .count();
         MovingAt {
             triangles: &self.triangles,
-            grids: &self.slices[slice],
+            grids: self.slices.get(slice),
             time,
         }
     }
@@ -165,7 +181,7 @@ impl<'a> MovingGrids<'a> {
 #[derive(Clone, Copy, Debug)]
 pub struct MovingAt<'g> {
     triangles: &'g MovingTriangles<'g>,
-    grids: &'g FaceGrids,
+    grids: Option<&'g FaceGrids>,
     time: f64,
 }
 
@@ -181,7 +197,14 @@ impl Candidates for MovingAt<'_> {
         count: &mut impl Count,
         visit: impl FnMut(u32, &mut RaySpan) -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        self.grids.each_candidate(ray, range, count, visit)
+        match self.grids {
+            Some(grids) => grids.each_candidate(ray, range, count, visit),
+            None => each_of(self.triangles.open.len() as u32, ray, range, count, visit),
+        }
+    }
+
+    fn is_filtered(&self) -> bool {
+        self.grids.is_some()
     }
 }
 

@@ -1,14 +1,15 @@
 //! From "which triangles may this ray meet" to all answers about rays.
 //!
 //! A grid only proposes triangles; which of them a ray meets, which hit is the closest and which triangle lies between
-//! a receiver and a light is decided here, once, by [`crate::exact`].
+//! a receiver and a light is decided here, once, by [`crate::exact`], after a filter in f64 has dropped those that are
+//! certainly missed: nearly all.
 
 use std::ops::ControlFlow;
 
 use glam::Vec3;
 
 use crate::brute::{hit_corners, rounded, write_sorted};
-use crate::exact::{self, ExactHit};
+use crate::exact::{self, ExactHit, Filter};
 use crate::grid3::RaySpan;
 use crate::{Count, Hit, Light, Ray, Receiver, ViewRay};
 
@@ -26,6 +27,12 @@ pub trait Candidates: Sync {
         count: &mut impl Count,
         visit: impl FnMut(u32, &mut RaySpan) -> ControlFlow<()>,
     ) -> ControlFlow<()>;
+
+    /// Whether triangles that are certainly missed may be dropped before the exact decision: not where that is to be
+    /// checked.
+    fn is_filtered(&self) -> bool {
+        true
+    }
 
     /// The closest hit in f64, with its triangle id.
     fn closest(&self, ray: &Ray, count: &mut impl Count) -> Option<(u32, ExactHit)> {
@@ -61,8 +68,9 @@ pub trait Candidates: Sync {
         let Some((ray, range)) = shadow_ray(receiver, light) else {
             return false;
         };
+        let filter = filter_of(self, &ray);
         let visit = |prim: u32, _: &mut RaySpan| {
-            if prim != receiver.prim && self.blocks(prim, receiver, light) {
+            if prim != receiver.prim && blocks(self.corners(prim), filter.as_ref(), receiver, light) {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -77,8 +85,9 @@ pub trait Candidates: Sync {
         let Some((ray, range)) = shadow_ray(receiver, light) else {
             return;
         };
+        let filter = filter_of(self, &ray);
         let _ = self.each_candidate(&ray, range, count, |prim, _| {
-            if prim != receiver.prim && self.blocks(prim, receiver, light) {
+            if prim != receiver.prim && blocks(self.corners(prim), filter.as_ref(), receiver, light) {
                 prims.push(prim);
             }
             ControlFlow::Continue(())
@@ -86,12 +95,18 @@ pub trait Candidates: Sync {
         prims.sort_unstable();
         prims.dedup();
     }
+}
 
-    /// Whether this triangle lies between a receiver that is not on it and a light.
-    fn blocks(&self, prim: u32, receiver: &Receiver, light: &Light) -> bool {
-        let corners = self.corners(prim);
-        corners.iter().all(|p| p.is_finite()) && exact::blocks(corners, receiver, light)
-    }
+fn filter_of<C: Candidates + ?Sized>(candidates: &C, ray: &ViewRay) -> Option<Filter> {
+    candidates.is_filtered().then(|| Filter::new(ray.origin, ray.dir))
+}
+
+/// Whether a triangle with these corners lies between a receiver that is not on it and a light.
+#[inline]
+fn blocks(corners: [Vec3; 3], filter: Option<&Filter>, receiver: &Receiver, light: &Light) -> bool {
+    !filter.is_some_and(|filter| filter.certain_miss(&corners))
+        && corners.iter().all(|p| p.is_finite())
+        && exact::blocks(corners, receiver, light)
 }
 
 /// The ray that [`exact::shadows`] sends, and its range. A negative error bound lets crossings behind either end count.
@@ -122,8 +137,16 @@ fn each_hit<C: Candidates + ?Sized>(
         dir: ray.dir.as_dvec3(),
     };
     let range = [f64::from(ray.t_min), f64::from(ray.t_max)];
+    let filter = filter_of(candidates, &line);
     candidates.each_candidate(&line, range, count, |prim, span| {
-        match hit_corners(candidates.corners(prim), ray) {
+        let corners = candidates.corners(prim);
+        if filter
+            .as_ref()
+            .is_some_and(|filter| filter.certain_miss(&corners))
+        {
+            return ControlFlow::Continue(());
+        }
+        match hit_corners(corners, ray) {
             Some(hit) => visit(prim, hit, span),
             None => ControlFlow::Continue(()),
         }

@@ -1,10 +1,11 @@
-//! Solids: grids equal brute force, intervals are those of point membership, and spheres do not shadow themselves.
+//! Solids: grids equal brute force, also at times of a shutter and pixel by pixel, intervals are those of point membership,
+//! and spheres do not shadow themselves.
 
 mod support;
 
 use glam::DVec3;
-use rayward_trace::solids::{Crossing, Solid, SolidBruteForce, SolidGrids, SolidReceiver, crossings};
-use rayward_trace::{FaceOptions, Light, ViewRay};
+use rayward_trace::solids::{Crossing, EyeSolids, Solid, SolidGrids, SolidHits, SolidReceiver, crossings};
+use rayward_trace::{FaceOptions, Light, Tile, View, ViewRay};
 use support::Random;
 
 fn point(random: &mut Random, size: f32) -> DVec3 {
@@ -14,7 +15,7 @@ fn point(random: &mut Random, size: f32) -> DVec3 {
 fn leaf(random: &mut Random, center: DVec3, size: f64) -> Solid {
     let radius = size * (0.2 + f64::from(random.unit()));
     let (from, to) = (center, center + random.direction().as_dvec3() * size * 2.0);
-    match random.below(4) {
+    match random.below(5) {
         0 => Solid::Cylinder { from, to, radius },
         1 => Solid::Capsule { from, to, radius },
         // Along an axis, where rays can be parallel.
@@ -23,6 +24,19 @@ fn leaf(random: &mut Random, center: DVec3, size: f64) -> Solid {
             to: from + DVec3::AXES[random.below(3)] * size,
             radius,
         },
+        3 => {
+            let axis = (to - from).normalize();
+            let (u, v) = axis.any_orthonormal_pair();
+            let turned = random.below(2) == 0;
+            Solid::Box {
+                center,
+                half: if turned {
+                    [axis * size, u * radius, v * size]
+                } else {
+                    [DVec3::X * radius, DVec3::Z * size, DVec3::Y * size * 0.5]
+                },
+            }
+        }
         _ => Solid::Sphere { center, radius },
     }
 }
@@ -84,7 +98,7 @@ fn grids_equal_brute_force() {
     for (k, (scale, offset)) in places.into_iter().enumerate() {
         let seed = 40 + k as u64;
         let solids = solids(seed, scale, offset);
-        let brute = SolidBruteForce(&solids);
+        let brute = SolidGrids::every([&solids, &solids]);
         let mut random = Random::new(seed);
         let centers = [offset, offset + DVec3::X * scale * 5.0];
         let grids = centers.map(|center| SolidGrids::build(center, &solids, &FaceOptions::default()));
@@ -103,7 +117,7 @@ fn grids_equal_brute_force() {
                 .filter(|(_, c)| c.t > range[0] && c.t <= range[1])
                 .collect();
             truth.sort_by(|(p, a), (q, b)| a.t.total_cmp(&b.t).then(p.cmp(q)));
-            let closest = brute.closest(&ray, range);
+            let closest = brute.closest(&ray, range, None, &mut ());
             assert_eq!(
                 bits(closest.as_slice()),
                 bits(&truth[..truth.len().min(1)]),
@@ -123,16 +137,145 @@ fn grids_equal_brute_force() {
             for grids in &grids {
                 grids.all(&ray, range, &mut (), &mut hits);
                 assert_eq!(bits(&hits), bits(&truth), "{}", place());
-                let found = grids.closest(&ray, range, &mut ());
+                let found = grids.closest(&ray, range, None, &mut ());
                 assert_eq!(bits(found.as_slice()), bits(closest.as_slice()), "{}", place());
+                if let Some(receiver) = &receiver {
+                    let leaving = ViewRay {
+                        origin: receiver.point,
+                        dir: random.direction().as_dvec3() * scale,
+                    };
+                    let truth = brute.closest(&leaving, [0.0, f64::INFINITY], receiver.on, &mut ());
+                    let found = grids.closest(&leaving, [0.0, f64::INFINITY], receiver.on, &mut ());
+                    assert_eq!(bits(found.as_slice()), bits(truth.as_slice()), "{}", place());
+                    assert!(truth.is_none_or(|(id, c)| Some((id, c.leaf)) != receiver.on || c.t > 1e-9));
+                }
                 for (receiver, light) in receiver.iter().flat_map(|r| lights.iter().map(move |l| (r, l))) {
-                    let truth = brute.shadows(receiver, light);
+                    let truth = brute.shadows(receiver, light, &mut ());
                     dark += usize::from(truth);
                     assert_eq!(grids.shadows(receiver, light, &mut ()), truth, "{}", place());
                 }
             }
         }
         assert!(seen > 500 && dark > 300, "{seen} {dark}");
+    }
+}
+
+#[test]
+fn moving_solids_are_those_of_their_time() {
+    let mut random = Random::new(45);
+    let open: Vec<_> = (0..30)
+        .map(|i| tree(&mut random, DVec3::ZERO, 0.2, i % 3))
+        .collect();
+    let moved = |v: DVec3| v * 1.1 + DVec3::new(0.3, -0.2, 0.1);
+    let close: Vec<_> = open
+        .iter()
+        .zip(0..)
+        .map(|(solid, i)| {
+            if i % 4 == 0 {
+                solid.clone()
+            } else {
+                shifted(solid, &moved)
+            }
+        })
+        .collect();
+    let grids = SolidGrids::moving(DVec3::Z * 3.0, [&open, &close], &FaceOptions::default());
+    let mut hits = 0;
+    for i in 0..2000 {
+        let time = f64::from(random.unit());
+        let now: Vec<_> = (0..open.len() as u32)
+            .map(|id| grids.at(time).solid(id).into_owned())
+            .collect();
+        let (brute, ray) = (
+            SolidGrids::every([&now, &now]),
+            ray(&mut random, 0.4, DVec3::ZERO),
+        );
+        let range = [0.0, f64::INFINITY];
+        let (truth, found) = (
+            brute.closest(&ray, range, None, &mut ()),
+            grids.at(time).closest(&ray, range, None, &mut ()),
+        );
+        assert_eq!(bits(found.as_slice()), bits(truth.as_slice()), "{i} at {time}");
+        hits += usize::from(truth.is_some());
+        let light = Light::Point(random.in_cube());
+        let receiver = SolidReceiver {
+            point: point(&mut random, 1.0),
+            error: 0.0,
+            on: None,
+        };
+        let dark = brute.shadows(&receiver, &light, &mut ());
+        assert_eq!(grids.at(time).shadows(&receiver, &light, &mut ()), dark, "{i}");
+    }
+    assert!(hits > 500, "{hits}");
+}
+
+/// The solid with its points moved.
+fn shifted(solid: &Solid, by: &impl Fn(DVec3) -> DVec3) -> Solid {
+    let pair = |pair: &[Solid; 2]| Box::new([shifted(&pair[0], by), shifted(&pair[1], by)]);
+    match solid {
+        Solid::Sphere { center, radius } => Solid::Sphere {
+            center: by(*center),
+            radius: radius * 1.2,
+        },
+        Solid::Cylinder { from, to, radius } => Solid::Cylinder {
+            from: by(*from),
+            to: by(*to),
+            radius: *radius,
+        },
+        Solid::Capsule { from, to, radius } => Solid::Capsule {
+            from: by(*from),
+            to: by(*to),
+            radius: radius * 0.7,
+        },
+        Solid::Box { center, half } => Solid::Box {
+            center: by(*center),
+            half: *half,
+        },
+        Solid::Union(both) => Solid::Union(pair(both)),
+        Solid::Intersection(both) => Solid::Intersection(pair(both)),
+        Solid::Difference(both) => Solid::Difference(pair(both)),
+    }
+}
+
+#[test]
+fn pixels_see_what_their_rays_meet() {
+    let solids = solids(46, 1.0, DVec3::ZERO);
+    let brute = SolidGrids::every([&solids, &solids]);
+    let (eye, size) = (DVec3::new(0.1, 0.2, 1.3).as_vec3(), [70, 52]);
+    let axes = [DVec3::X, DVec3::Y, DVec3::NEG_Z];
+    let views = [
+        View::perspective(eye, axes, [0.7, 0.5], size),
+        // From among the solids, so that boxes reach behind the eye.
+        View::perspective((DVec3::Z * 0.2).as_vec3(), axes, [3.0, 2.0], size),
+        View::parallel(eye, axes, [1.1, 0.8], 20.0, size),
+    ];
+    for (which, view) in views.into_iter().enumerate() {
+        let eye = EyeSolids::build(view, &solids, 16);
+        let (mut hits, mut seen) = (SolidHits::default(), 0);
+        for (index, corner) in (0..52u32.div_ceil(16))
+            .flat_map(|y| (0..70u32.div_ceil(16)).map(move |x| [x * 16, y * 16]))
+            .enumerate()
+        {
+            let tile = Tile {
+                index: index as u32,
+                x: corner[0],
+                y: corner[1],
+                width: (70 - corner[0]).min(16),
+                height: (52 - corner[1]).min(16),
+            };
+            eye.trace_tile(&tile, &mut hits);
+            for [x, y] in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| [x, y])) {
+                let ray = view.pixel_ray(tile.x + x, tile.y + y);
+                let truth = brute.closest(&ray, [0.0, f64::INFINITY], None, &mut ());
+                let found = hits.at(x, y).copied();
+                assert_eq!(
+                    bits(found.as_slice()),
+                    bits(truth.as_slice()),
+                    "view {which}, {tile:?}, {x} {y}"
+                );
+                seen += usize::from(truth.is_some());
+            }
+        }
+        assert!(seen > 500, "view {which}: {seen}");
     }
 }
 
@@ -150,6 +293,9 @@ fn holds(solid: &Solid, p: DVec3) -> bool {
             between && distance < *radius
         }
         Solid::Capsule { from, to, radius } => beside(*from, *to, true).1 < *radius,
+        Solid::Box { center, half } => half
+            .iter()
+            .all(|half| (p - *center).dot(*half).abs() < half.length_squared()),
         Solid::Union(pair) => holds(&pair[0], p) || holds(&pair[1], p),
         Solid::Intersection(pair) => holds(&pair[0], p) && holds(&pair[1], p),
         Solid::Difference(pair) => holds(&pair[0], p) && !holds(&pair[1], p),
@@ -204,13 +350,13 @@ fn a_sphere_does_not_shadow_itself() {
     for i in 0..20_000 {
         let center = point(&mut random, 1.0) * if i % 2 == 0 { 1.0 } else { 1e5 };
         let solids = [Solid::Sphere { center, radius: 0.5 }];
-        let brute = SolidBruteForce(&solids);
+        let brute = SolidGrids::every([&solids, &solids]);
         let from = center + random.direction().as_dvec3().normalize() * 3.0;
         let ray = ViewRay {
             origin: from,
             dir: center + point(&mut random, 0.4) - from,
         };
-        let Some((_, hit)) = brute.closest(&ray, [0.0, f64::INFINITY]) else {
+        let Some((_, hit)) = brute.closest(&ray, [0.0, f64::INFINITY], None, &mut ()) else {
             continue;
         };
         let receiver = SolidReceiver {
@@ -221,7 +367,7 @@ fn a_sphere_does_not_shadow_itself() {
         let light = random.direction().as_dvec3().normalize();
         let cosine = light.dot(hit.normal);
         if cosine.abs() > 1e-4 {
-            let dark = brute.shadows(&receiver, &Light::Directional(light.as_vec3()));
+            let dark = brute.shadows(&receiver, &Light::Directional(light.as_vec3()), &mut ());
             assert_eq!(dark, cosine < 0.0, "{i}: {cosine}");
         }
     }

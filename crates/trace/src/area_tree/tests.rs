@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::*;
 use crate::test_meshes::{Mesh, Numbers};
-use crate::{BruteForce, Casts};
+use crate::{AreaLightGrid, BruteForce, Casts, FaceOptions};
 
 /// Surface points seen from `eye`, and free points.
 fn receivers(mesh: &Mesh, eye: Vec3, count: usize, seed: u64) -> Vec<Receiver> {
@@ -45,6 +45,27 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: AreaLight, coun
             assert_eq!(got, want, "{}", place());
         }
         counts = scratch.counts;
+    }
+    for resolution in [None, Some([24, 20, 4])] {
+        let options = FaceOptions {
+            resolution,
+            ..FaceOptions::default()
+        };
+        let grid = AreaLightGrid::build(light, triangles, &|_| Casts::Both, &options);
+        let (mut scratch, mut bits) = (AreaScratch::default(), Vec::new());
+        grid.visible(receivers, &pixels, &samples, &mut scratch, &mut bits);
+        for (i, (got, want)) in bits.chunks(samples.words()).zip(&expected).enumerate() {
+            let place = || format!("{name}, {resolution:?}, {light:?}, {i}: {:?}", receivers[i]);
+            assert_eq!(got, want, "{}", place());
+        }
+        let (asked, tests) = (scratch.counts.receivers, scratch.counts.tests);
+        assert_eq!(asked, counts.receivers);
+        // Far from the light f64 cannot tell cells apart, and each triangle is tested.
+        let every = asked * u64::from(count) * triangles.len() as u64;
+        assert!(
+            tests < every.max(1) || light.center.length() > 1e3,
+            "{name}: {tests} of {every}"
+        );
     }
     counts
 }

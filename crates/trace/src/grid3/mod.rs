@@ -19,6 +19,7 @@
 mod cells;
 mod overlap;
 mod partition;
+mod slices;
 mod walk;
 
 use std::ops::ControlFlow;
@@ -33,8 +34,9 @@ use crate::{Accel, BuildStats, Count, Hit, Light, Ray, Receiver, Triangles, View
 pub(crate) use overlap::Outline;
 pub(crate) use overlap::reaches_cube;
 pub(crate) use partition::Partition;
+pub(crate) use slices::PACKET;
 pub use walk::RaySpan;
-pub(crate) use walk::{SpaceGrid, Walk};
+pub(crate) use walk::{Mailbox, SpaceGrid, Walk};
 
 /// Cells of a grid at most; a finer resolution is halved along its longest axis until it fits.
 const MOST_CELLS: u64 = 1 << 26;

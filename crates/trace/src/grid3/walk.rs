@@ -49,7 +49,7 @@ impl Mailbox {
     }
 
     #[inline]
-    fn is_new(&mut self, item: u32) -> bool {
+    pub(crate) fn is_new(&mut self, item: u32) -> bool {
         let slot = &mut self.0[(item & 255) as usize];
         let new = *slot != item;
         *slot = item;

@@ -1,5 +1,6 @@
-//! Solids that are not made of triangles: spheres, cylinders, capsules, and what constructive solid geometry makes of
-//! them. [`SolidGrids`] is their structure, [`crossings`] the definition of every answer.
+//! Solids that are not made of triangles: spheres, cylinders, capsules, boxes, and what constructive solid geometry makes
+//! of them. [`SolidGrids`] is their structure for any ray, [`EyeSolids`] that of a camera's, [`crossings`] the definition of
+//! every answer.
 //!
 //! Source: HM08 §3: non-polygonal objects are put into a perspective grid by the bounds of their transformed bounding
 //! boxes, and met in world space.
@@ -16,14 +17,16 @@
 //!
 //! Cost: some 20 ns a leaf, and a few small allocations a tree. Units are the caller's.
 
-use std::cmp::Ordering;
-use std::ops::ControlFlow;
+mod between;
+mod eye;
+mod grids;
 
 use glam::DVec3;
 
-use crate::faces::{FaceGrids, FaceOptions};
-use crate::grid3::{Outline, RaySpan};
-use crate::{Count, Light, ViewRay};
+use crate::{Light, Receiver, ViewRay};
+
+pub use eye::{EyeSolids, SolidHits};
+pub use grids::{SolidGrids, SolidsAt};
 
 /// A solid in the frame's local space.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +56,13 @@ pub enum Solid {
         /// The radius, above 0.
         radius: f64,
     },
+    /// A box of any orientation.
+    Box {
+        /// The middle.
+        center: DVec3,
+        /// From the middle to the middles of three faces, at right angles.
+        half: [DVec3; 3],
+    },
     /// What is in either.
     Union(Box<[Solid; 2]>),
     /// What is in both.
@@ -74,7 +84,7 @@ pub struct Crossing {
     pub enters: bool,
 }
 
-/// A point on the surface of a solid that asks whether a light sees it.
+/// A point that asks whether solids hide a light from it, or what solid a ray from it meets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SolidReceiver {
     /// The point.
@@ -83,6 +93,42 @@ pub struct SolidReceiver {
     pub error: f64,
     /// The solid and the leaf it lies on; `None` for a point that is on no solid.
     pub on: Option<(u32, u32)>,
+}
+
+impl SolidReceiver {
+    /// The receiver where a ray crosses the surface of solid `id`.
+    pub fn along(ray: &ViewRay, id: u32, solid: &Solid, crossing: &Crossing) -> Self {
+        let Receiver { point, error, .. } = Receiver::along(ray, crossing.t, u32::MAX);
+        // The crossing was computed from the solid's own coordinates, too.
+        let size = solid
+            .bounds()
+            .map_or(0.0, |[low, high]| low.abs().max(high.abs()).max_element());
+        Self {
+            point,
+            error: error.max(size * 2f64.powi(-40)),
+            on: Some((id, crossing.leaf)),
+        }
+    }
+
+    /// The same point as a receiver of what triangles cast.
+    pub fn among_triangles(&self) -> Receiver {
+        Receiver {
+            point: self.point,
+            error: self.error,
+            prim: u32::MAX,
+        }
+    }
+}
+
+impl From<&Receiver> for SolidReceiver {
+    /// A point of a triangle, or a free one.
+    fn from(receiver: &Receiver) -> Self {
+        Self {
+            point: receiver.point,
+            error: receiver.error,
+            on: None,
+        }
+    }
 }
 
 /// An interval of a line within a solid.
@@ -113,6 +159,11 @@ impl Solid {
             Self::Cylinder { from, to, .. } if from == to => None,
             Self::Cylinder { from, to, radius } | Self::Capsule { from, to, radius } => {
                 around(&[*from, *to], *radius)
+            }
+            Self::Box { center, half } => {
+                let reach = half[0].abs() + half[1].abs() + half[2].abs();
+                let flat = half.iter().any(|half| *half == DVec3::ZERO);
+                (!flat).then(|| usable([*center - reach, *center + reach]))?
             }
             Self::Union(both) => match (both[0].bounds(), both[1].bounds()) {
                 (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
@@ -194,6 +245,17 @@ impl Solid {
                 let parts = parts.into_iter().flatten();
                 parts.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?
             }
+            Self::Box { center, half } => {
+                let origin = ray.origin - *center;
+                let all = [f64::NEG_INFINITY, f64::INFINITY];
+                half.iter().try_fold(all, |range, half| {
+                    let square = half.length_squared();
+                    both(
+                        range,
+                        slab(origin.dot(*half), ray.dir.dot(*half), -square, square)?,
+                    )
+                })?
+            }
             _ => return None,
         };
         both(within, found)
@@ -224,6 +286,18 @@ impl Solid {
                 let along = (p - *from).dot(axis) / axis.length_squared();
                 let along = if along > 0.0 { along.min(1.0) } else { 0.0 };
                 (p - *from - axis * along).normalize_or_zero()
+            }
+            Self::Box { center, half } => {
+                // That of the face which is nearest.
+                let across = half.map(|half| (p - *center).dot(half) / half.length());
+                let inward = |axis: usize| (half[axis].length() - across[axis].abs()).abs();
+                let nearest = (1..3).fold(
+                    0,
+                    |best, axis| {
+                        if inward(axis) < inward(best) { axis } else { best }
+                    },
+                );
+                half[nearest].normalize_or_zero() * across[nearest].signum()
             }
             _ => DVec3::ZERO,
         }
@@ -309,7 +383,7 @@ fn combined(a: &[Inside], b: &[Inside], turned: bool, inside: impl Fn(bool, bool
     }
 }
 
-/// The solids that a light's ray may meet, and the ray from the receiver to the light with its range.
+/// The ray from a receiver to a light, with the range in which crossings hide it.
 fn towards(receiver: &SolidReceiver, light: &Light) -> (ViewRay, [f64; 2]) {
     let dir = light.towards(receiver.point);
     let end = match light {
@@ -324,122 +398,25 @@ fn towards(receiver: &SolidReceiver, light: &Light) -> (ViewRay, [f64; 2]) {
 }
 
 /// Whether a solid lies between a receiver and a light.
-fn blocks(solids: &[Solid], solid: u32, receiver: &SolidReceiver, light: &Light) -> bool {
+fn blocks(solid: &Solid, id: u32, receiver: &SolidReceiver, light: &Light) -> bool {
     let (ray, [from, to]) = towards(receiver, light);
-    let own = receiver.on.filter(|on| on.0 == solid).map(|on| on.1);
-    crossings(&solids[solid as usize], &ray, own)
-        .iter()
-        .any(|crossing| crossing.t > from && crossing.t < to)
+    let all = crossings(solid, &ray, own_leaf(receiver.on, id));
+    all.iter().any(|crossing| crossing.t > from && crossing.t < to)
 }
 
-/// Perspective grids over solids. See the [module](self).
-#[derive(Clone, Debug)]
-pub struct SolidGrids<'a> {
-    solids: &'a [Solid],
-    grids: FaceGrids,
+/// The leaf of solid `id` that a ray starts on.
+fn own_leaf(on: Option<(u32, u32)>, id: u32) -> Option<u32> {
+    on.filter(|on| on.0 == id).map(|on| on.1)
 }
 
-impl<'a> SolidGrids<'a> {
-    /// Builds over all solids that are finite and not empty, in parallel; the same for any number of threads. Any
-    /// `center` will do; one that rays pass close by is fast.
-    pub fn build(center: DVec3, solids: &'a [Solid], options: &FaceOptions) -> Self {
-        let outline = |id: u32| {
-            let [low, high] = solids[id as usize].bounds()?;
-            Some(Outline::boxed(low, high))
-        };
-        Self {
-            solids,
-            grids: FaceGrids::build(center, solids.len(), options, outline),
-        }
-    }
-
-    /// The first crossing with a parameter above `range[0]` and up to `range[1]`, with its solid.
-    pub fn closest(&self, ray: &ViewRay, range: [f64; 2], count: &mut impl Count) -> Option<(u32, Crossing)> {
-        let mut best: Option<(u32, Crossing)> = None;
-        let _ = self.grids.each_candidate(ray, range, count, |id, span| {
-            if let Some(next) = first(&self.solids[id as usize], ray, range) {
-                let closer = best.is_none_or(|(other, b)| next.t < b.t || (next.t == b.t && id < other));
-                if closer {
-                    best = Some((id, next));
-                    span.shorten(next.t);
-                }
-            }
-            ControlFlow::Continue(())
-        });
-        best
-    }
-
-    /// Replaces `hits` by all crossings with parameters above `range[0]` and up to `range[1]`, by parameter, then solid.
-    pub fn all(
-        &self,
-        ray: &ViewRay,
-        range: [f64; 2],
-        count: &mut impl Count,
-        hits: &mut Vec<(u32, Crossing)>,
-    ) {
-        hits.clear();
-        let mut ids = Vec::new();
-        let _ = self
-            .grids
-            .each_candidate(ray, range, count, |id, _: &mut RaySpan| {
-                ids.push(id);
-                ControlFlow::Continue(())
-            });
-        ids.sort_unstable();
-        ids.dedup();
-        for id in ids {
-            let all = crossings(&self.solids[id as usize], ray, None);
-            hits.extend(
-                all.into_iter()
-                    .filter(|c| c.t > range[0] && c.t <= range[1])
-                    .map(|c| (id, c)),
-            );
-        }
-        // Stable: crossings of one solid at one parameter stay in the order in which the line passes them.
-        hits.sort_by(|(p, a), (q, b)| a.t.partial_cmp(&b.t).unwrap_or(Ordering::Equal).then(p.cmp(q)));
-    }
-
-    /// Whether some solid lies between a receiver and a light.
-    pub fn shadows(&self, receiver: &SolidReceiver, light: &Light, count: &mut impl Count) -> bool {
-        let (ray, [_, to]) = towards(receiver, light);
-        let visit = |id: u32, _: &mut RaySpan| {
-            if blocks(self.solids, id, receiver, light) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
-        self.grids
-            .each_candidate(&ray, [0.0, to], count, visit)
-            .is_break()
-    }
-
-    /// Memory of the grids in bytes, the solids themselves left out.
-    pub fn bytes(&self) -> usize {
-        self.grids.bytes()
-    }
-}
-
-fn first(solid: &Solid, ray: &ViewRay, [from, to]: [f64; 2]) -> Option<Crossing> {
-    let all = crossings(solid, ray, None);
+/// The first crossing of a solid in a range; see [`SolidGrids::closest`].
+fn first(
+    solid: &Solid,
+    id: u32,
+    ray: &ViewRay,
+    [from, to]: [f64; 2],
+    on: Option<(u32, u32)>,
+) -> Option<Crossing> {
+    let all = crossings(solid, ray, own_leaf(on, id));
     all.into_iter().find(|c| c.t > from && c.t <= to)
-}
-
-/// Every solid tested: the definition of the right answer.
-#[derive(Clone, Copy, Debug)]
-pub struct SolidBruteForce<'a>(pub &'a [Solid]);
-
-impl SolidBruteForce<'_> {
-    /// As [`SolidGrids::closest`].
-    pub fn closest(&self, ray: &ViewRay, range: [f64; 2]) -> Option<(u32, Crossing)> {
-        let hits = (0..)
-            .zip(self.0)
-            .filter_map(|(id, solid)| Some((id, first(solid, ray, range)?)));
-        hits.reduce(|best, next| if next.1.t < best.1.t { next } else { best })
-    }
-
-    /// As [`SolidGrids::shadows`].
-    pub fn shadows(&self, receiver: &SolidReceiver, light: &Light) -> bool {
-        (0..self.0.len() as u32).any(|id| blocks(self.0, id, receiver, light))
-    }
 }
