@@ -64,7 +64,7 @@ pub enum Error {
         /// The limit.
         limit: String,
     },
-    /// There is no triangle to show.
+    /// There is nothing to show.
     #[error("{}: no triangles in it ({detail})", path.display())]
     Empty {
         /// The file.

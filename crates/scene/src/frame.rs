@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use crate::{LightKind, Projection};
+use crate::{LightKind, PosedSolid, Projection};
 
 /// All triangles of one frame with the posed cameras and lights. Triangle ids (`prim`) index `indices`.
 ///
@@ -32,6 +32,8 @@ pub struct FrameGeometry {
     pub attributes: VertexAttributes,
     /// One entry per drawn primitive, in triangle order; their ranges tile `0..indices.len()`.
     pub objects: Vec<ObjectRange>,
+    /// Solids that are not made of triangles.
+    pub solids: Vec<PosedSolid>,
     /// Cameras in world space.
     pub cameras: Vec<PosedCamera>,
     /// Lights in world space.
@@ -120,10 +122,22 @@ impl FrameGeometry {
         Vec3::new(self.x[i], self.y[i], self.z[i])
     }
 
-    /// Smallest and largest corner of the box around all vertices, relative to `origin`; `None` without
-    /// triangles.
+    /// Whether there is nothing to see.
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty() && self.solids.is_empty()
+    }
+
+    /// Smallest and largest corner of the box around all vertices of triangles and all solids, relative to `origin`;
+    /// `None` without any.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        let mut corners = self.indices.iter().flatten().map(|&i| self.position(i));
+        let corners = self.indices.iter().flatten().map(|&i| self.position(i));
+        let outward = |[low, high]: [DVec3; 2]| {
+            let low = low.as_vec3().to_array().map(f32::next_down);
+            let high = high.as_vec3().to_array().map(f32::next_up);
+            [Vec3::from_array(low), Vec3::from_array(high)]
+        };
+        let solids = self.solids.iter().filter_map(|solid| solid.shape.bounds());
+        let mut corners = corners.chain(solids.flat_map(outward));
         let first = corners.next()?;
         Some(corners.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p))))
     }

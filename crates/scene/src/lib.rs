@@ -16,6 +16,7 @@ mod load;
 mod material;
 mod pose;
 mod scene;
+mod solid;
 
 pub use camera_file::{
     AreaLight, CameraEntry, find_camera, point_light_for, read_camera_file, square_light_at,
@@ -29,3 +30,4 @@ pub use scene::{
     Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Mesh, MorphTarget, Node,
     Primitive, Projection, Scene, Skin, Transform,
 };
+pub use solid::{PosedSolid, Shape, Solid};

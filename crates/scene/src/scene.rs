@@ -5,7 +5,7 @@
 
 use glam::{DMat4, DQuat, DVec3, Mat4, Quat, Vec2, Vec3, Vec4};
 
-use crate::{Image, Material, Notice, Sampler};
+use crate::{Image, Material, Notice, Sampler, Solid};
 
 /// A whole scene: what one file, or one procedural generator, holds.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +22,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Samplers, referred to by texture references. Index 0 always exists (repeat, linear).
     pub samplers: Vec<Sampler>,
+    /// Solids, referred to by nodes.
+    pub solids: Vec<Solid>,
     /// Skins, referred to by nodes.
     pub skins: Vec<Skin>,
     /// Animations in file order.
@@ -49,6 +51,8 @@ pub struct Node {
     pub skin: Option<usize>,
     /// Morph weights of this node; empty means the mesh's own defaults.
     pub weights: Vec<f32>,
+    /// Solid shown at this node.
+    pub solid: Option<usize>,
     /// Camera at this node, looking along its local -Z.
     pub camera: Option<usize>,
     /// Light at this node, shining along its local -Z.

@@ -88,6 +88,7 @@ fn counts_are_those_of_the_paper() {
         ("collide", 252_000),
         ("teapot-mirror", 16_000),
         ("walker", 1_700),
+        ("solids", 1_116),
     ];
     let names: Vec<_> = table.iter().map(|row| row.0).collect();
     assert!(builtin::NAMES.iter().all(|n| names.contains(n)) && names.len() == builtin::NAMES.len());
@@ -144,6 +145,10 @@ fn every_reference_is_in_range_and_parents_come_first() {
             assert!(
                 node.mesh.is_none_or(|m| m < scene.meshes.len()),
                 "{name}: mesh of node {i}"
+            );
+            assert!(
+                node.solid.is_none_or(|s| s < scene.solids.len()),
+                "{name}: solid of node {i}"
             );
             assert!(
                 node.skin.is_none_or(|s| s < scene.skins.len()),

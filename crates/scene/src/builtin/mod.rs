@@ -14,6 +14,7 @@
 //! | `collide` | 252k | two organic surfaces, one slides against the other and back in 4 s |
 //! | `teapot-mirror` | 16k | a teapot and balls on a mirror |
 //! | `walker` | 1.7k | a skinned figure walks on the spot, 1 s |
+//! | `solids` | 1.1k | spheres, capsules, boxes and what is made of them, between triangles; some of it moves, 4 s |
 //!
 //! All but `forest` consist of closed 2-manifolds with outward faces that share no edge with each other, also when
 //! their frames are welded; parts overlap where they are joined.
@@ -27,6 +28,7 @@ mod office;
 mod plants;
 mod random;
 mod shapes;
+mod solids;
 mod stage;
 mod statue;
 mod teapot;
@@ -47,6 +49,7 @@ pub const NAMES: &[&str] = &[
     "collide",
     "teapot-mirror",
     "walker",
+    "solids",
 ];
 
 /// The scene `blob-*` of any size: one organic surface of `20 * frequency^2` triangles.
@@ -71,6 +74,7 @@ pub fn build(name: &str) -> Result<Scene, Error> {
         "collide" => blob::collide(),
         "teapot-mirror" => teapot::teapot_mirror(),
         "walker" => walker::walker(),
+        "solids" => solids::solids(),
         _ => {
             return Err(Error::UnknownBuiltin {
                 name: name.into(),

@@ -5,7 +5,7 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3, Vec4};
 use super::shapes::Surface;
 use crate::{
     Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Material, Mesh, Node,
-    Primitive, Projection, Sampler, Scene, Transform,
+    Primitive, Projection, Sampler, Scene, Shape, Solid, Transform,
 };
 
 /// A scene under construction.
@@ -97,6 +97,18 @@ impl Stage {
     pub(super) fn show(&mut self, name: &str, surface: Surface, material: usize) -> usize {
         let mesh = self.solid(name, surface, material);
         self.place(name, mesh, None, Transform::default())
+    }
+
+    /// Adds a solid that is not made of triangles and shows it.
+    pub(super) fn show_solid(&mut self, name: &str, shape: Shape, material: usize, at: Transform) -> usize {
+        self.scene.solids.push(Solid { shape, material });
+        let solid = Some(self.scene.solids.len() - 1);
+        self.node(Node {
+            name: name.into(),
+            solid,
+            transform: at,
+            ..Node::default()
+        })
     }
 
     /// Adds a camera at `eye` that looks at `target`; `vfov` in degrees.

@@ -19,9 +19,9 @@ pub(crate) mod origin;
 mod triangles;
 mod vertices;
 
-use glam::{DMat3, DMat4};
+use glam::{DMat3, DMat4, DVec3};
 
-use crate::{FrameGeometry, Node, ObjectRange, Primitive, Scene, Transform};
+use crate::{FrameGeometry, Node, ObjectRange, PosedSolid, Primitive, Scene, Transform};
 
 impl Scene {
     /// The frame at `time` seconds: animation 0 plays if there is one, clamped before its first and after its last
@@ -60,6 +60,7 @@ impl Scene {
         let draws = draws(self, &pose, &world);
         vertices::write(&draws, frame);
         triangles::write(&draws, frame);
+        frame.solids = solids(self, &world, frame.origin);
 
         lights::pose_cameras(self, &world, &mut frame.cameras);
         lights::pose_lights(self, &world, &mut frame.lights);
@@ -79,6 +80,20 @@ impl Scene {
             )
         })
     }
+}
+
+/// All solids, in node order.
+fn solids(scene: &Scene, world: &[DMat4], origin: DVec3) -> Vec<PosedSolid> {
+    let nodes = scene.nodes.iter().zip(world).zip(0..);
+    let posed = |((node, matrix), index): ((&Node, &DMat4), u32)| {
+        let solid = &scene.solids[node.solid?];
+        Some(PosedSolid {
+            shape: solid.shape.placed(matrix, origin),
+            material: solid.material as u32,
+            node: index,
+        })
+    };
+    nodes.filter_map(posed).collect()
 }
 
 /// World matrix of every node. A parent comes before its children, so one pass is enough.

@@ -5,7 +5,7 @@
 //! origin is `c` rounded to a multiple of the power of two next above `r`, so that the subtraction is exact for
 //! most files and a moved scene keeps its bits if it was moved by such a multiple.
 //!
-//! The box is that of at most [`SAMPLES`] vertices a primitive: the rule needs a place and a size, not a
+//! The box is that of all solids and of at most [`SAMPLES`] vertices a primitive: the rule needs a place and a size, not a
 //! bound, and a frame should not cost a pass over all vertices for it.
 
 use glam::{DMat4, DVec3};
@@ -48,6 +48,9 @@ fn rest_bounds(scene: &Scene) -> Option<(DVec3, DVec3)> {
         }
     };
     for (index, node) in scene.nodes.iter().enumerate() {
+        let solid = node.solid.map(|solid| &scene.solids[solid].shape);
+        let around = solid.and_then(|shape| shape.placed(&world[index], DVec3::ZERO).bounds());
+        around.into_iter().flatten().for_each(&mut add);
         let Some(mesh) = node.mesh else { continue };
         let skin = node.skin.map(|s| &scene.skins[s]);
         for primitive in &scene.meshes[mesh].primitives {

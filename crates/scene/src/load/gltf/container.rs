@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gltf::json::{Root, Value};
 
-use super::{Notices, malformed};
+use super::{Notices, malformed, solid};
 use crate::Error;
 
 /// Extensions whose content is read, or which change nothing that is shown.
@@ -54,6 +54,8 @@ pub(super) struct Container<'a> {
     pub(super) root: Root,
     /// `extras.radius` of each `KHR_lights_punctual` light, 0 where absent.
     pub(super) light_radii: Vec<f32>,
+    /// The extras of each node by which it is a solid, null where absent; empty if all are.
+    pub(super) solids: Vec<Value>,
     /// Content of the GLB's BIN chunk.
     pub(super) bin: Option<&'a [u8]>,
 }
@@ -72,6 +74,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], notices: &mut Notices) -> 
     let mut json: Value = serde_json::from_slice(text).map_err(|e| json_error(path, &e))?;
     check_version(path, &json)?;
     let light_radii = light_radii(&json);
+    let solids = solids(&mut json);
     fit_to_model(&mut json, notices);
     let root: Root = serde_json::from_value(json).map_err(|e| {
         // Only the text knows lines; it may not show the same error, as it was fitted to the model meanwhile.
@@ -84,6 +87,7 @@ pub(super) fn parse<'a>(path: &Path, bytes: &'a [u8], notices: &mut Notices) -> 
     Ok(Container {
         root,
         light_radii,
+        solids,
         bin,
     })
 }
@@ -191,6 +195,21 @@ fn light_radii(json: &Value) -> Vec<f32> {
     lights
         .map(|lights| lights.iter().map(radius).map(sound).collect())
         .unwrap_or_default()
+}
+
+fn solids(json: &mut Value) -> Vec<Value> {
+    let Some(nodes) = json.get_mut("nodes").and_then(Value::as_array_mut) else {
+        return Vec::new();
+    };
+    let take = |node: &mut Value| node.get_mut("extras")?.get_mut(solid::KEY).map(Value::take);
+    let solids: Vec<_> = nodes
+        .iter_mut()
+        .map(|node| take(node).unwrap_or_default())
+        .collect();
+    if solids.iter().all(Value::is_null) {
+        return Vec::new();
+    }
+    solids
 }
 
 /// Changes what `gltf::json` cannot take though the format allows it: extras inside of extensions, scenes

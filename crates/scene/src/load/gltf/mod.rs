@@ -7,7 +7,8 @@
 //!
 //! Read: the default scene's nodes with meshes (indexed and not, triangles, strips, fans), skins, morph targets,
 //! animations, cameras, materials, textures (PNG, JPEG), and the extensions of `container::KNOWN_EXTENSIONS`.
-//! `extras.radius` of a punctual light is its radius in metres for soft shadows.
+//! `extras.radius` of a punctual light is its radius in metres for soft shadows, `extras.rayward_solid` of a node a
+//! [`solid`].
 //!
 //! [`LoadOptions`] become a node without name above the scene's roots. Lengths that no node scales (light range
 //! and radius, thickness, attenuation distance, orthographic size) are multiplied with the scale; intensities
@@ -26,6 +27,7 @@ mod material;
 mod mesh;
 mod node;
 mod skin;
+mod solid;
 mod source;
 
 use std::path::Path;
@@ -49,7 +51,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     let meshes = mesh::read(&source, &mut notices)?;
     let mut tree = node::read(&source, options, &meshes, &mut notices)?;
     let triangles = tree.count_triangles(&source, &meshes)?;
-    if triangles == 0 {
+    if triangles == 0 && tree.count_solids() == 0 {
         let count = |n: usize, one: &str, many: &str| format!("{n} {}", if n == 1 { one } else { many });
         let (nodes, meshes) = (source.root.nodes.len(), source.root.meshes.len());
         let detail = format!(
@@ -64,7 +66,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
     }
     let materials = material::read(&source, options, &mut notices)?;
     let animations = animation::read(&source, &mut tree, &meshes, &mut notices)?;
-    Ok(Scene {
+    let scene = Scene {
         name: path
             .file_stem()
             .map(|stem| stem.to_string_lossy().into_owned())
@@ -75,11 +77,14 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
         materials: materials.materials,
         samplers: materials.samplers,
         nodes: tree.nodes,
+        solids: tree.solids,
         skins: tree.skins,
         meshes,
         animations,
         notices: notices.finish(),
-    })
+    };
+    solid::check(&source, &scene)?;
+    Ok(scene)
 }
 
 fn malformed(path: &Path, place: impl Into<String>, problem: impl Into<String>) -> Error {

@@ -11,12 +11,13 @@ use gltf::json::accessor::Type;
 use super::accessor::Elements;
 use super::lens::punctual;
 use super::source::Source;
-use super::{MAX_NODES, MAX_VERTICES, Notices, place, skin};
-use crate::{Error, LoadOptions, Mesh, Node, Skin, Transform, UpAxis};
+use super::{MAX_NODES, MAX_VERTICES, Notices, place, skin, solid};
+use crate::{Error, LoadOptions, Mesh, Node, Skin, Solid, Transform, UpAxis};
 
 /// The nodes of the scene and where they come from.
 pub(super) struct Tree {
     pub(super) nodes: Vec<Node>,
+    pub(super) solids: Vec<Solid>,
     pub(super) skins: Vec<Skin>,
     /// For each node of the file its index in `nodes`.
     pub(super) index: Vec<Option<usize>>,
@@ -82,6 +83,8 @@ pub(super) fn read(
         skins: &skins,
         notices,
         nodes: Vec::new(),
+        solids: Vec::new(),
+        leaves: 0,
         top: None,
     };
     builder.top = builder.push_options(options);
@@ -92,10 +95,11 @@ pub(super) fn read(
         index[i] = Some(builder.nodes.len());
         instanced[i] = builder.push(i, parent, shown)?;
     }
-    let nodes = builder.nodes;
+    let (nodes, solids) = (builder.nodes, builder.solids);
     let skins = skins.read(source, &index)?;
     Ok(Tree {
         nodes,
+        solids,
         skins,
         index,
         instanced,
@@ -181,6 +185,9 @@ struct Builder<'b> {
     skins: &'b skin::Used,
     notices: &'b mut Notices,
     nodes: Vec<Node>,
+    solids: Vec<Solid>,
+    /// What all solids up to here are made of.
+    leaves: usize,
     /// The node that applies the options, parent of all roots.
     top: Option<usize>,
 }
@@ -219,6 +226,10 @@ impl Builder<'_> {
             ..Node::default()
         };
         if shown {
+            if let Some(solid) = solid::read(source, i, &place, &mut self.leaves)? {
+                out.solid = Some(self.solids.len());
+                self.solids.push(solid);
+            }
             self.attach(node, &mut out, &place)?;
         }
         let Some(instances) = Instances::of(source, i)?.filter(|_| shown) else {

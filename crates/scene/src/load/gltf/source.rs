@@ -22,6 +22,7 @@ pub(super) struct Source<'a> {
     pub(super) path: &'a Path,
     pub(super) root: Root,
     pub(super) light_radii: Vec<f32>,
+    pub(super) solids: Vec<serde_json::Value>,
     buffers: Vec<Option<Cow<'a, [u8]>>>,
     /// Bytes read from URIs so far: a file may name one large file many times.
     bytes_read: AtomicU64,
@@ -33,12 +34,14 @@ impl<'a> Source<'a> {
         let Container {
             root,
             light_radii,
+            solids,
             bin,
         } = container;
         let mut source = Self {
             path,
             root,
             light_radii,
+            solids,
             buffers: Vec::new(),
             bytes_read: AtomicU64::new(0),
         };
