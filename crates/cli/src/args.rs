@@ -349,7 +349,7 @@ pub(crate) struct PictureArgs {
     pub(crate) paper: bool,
     /// Test every triangle for every ray, in f64, to check the structures: the same picture, bit for bit. Small
     /// pictures only
-    #[arg(long, conflicts_with_all = ["paper", "aperture", "shutter"])]
+    #[arg(long, conflicts_with = "paper")]
     pub(crate) reference: bool,
 }
 

@@ -21,6 +21,7 @@ struct Info {
     triangles: usize,
     vertices: usize,
     objects: usize,
+    solids: usize,
     dropped_non_finite: usize,
     dropped_degenerate: usize,
     nodes: usize,
@@ -117,6 +118,7 @@ impl Info {
             triangles: frame.triangle_count(),
             vertices: frame.x.len(),
             objects: frame.objects.len(),
+            solids: frame.solids.len(),
             dropped_non_finite: frame.dropped_non_finite,
             dropped_degenerate: frame.dropped_degenerate,
             nodes: scene.nodes.len(),
@@ -167,6 +169,9 @@ impl Info {
             format_args!("{} vertices", thousands(self.vertices as u64)),
             count(self.objects, "object")
         )?;
+        if self.solids > 0 {
+            writeln!(out, "solids      {}", thousands(self.solids as u64))?;
+        }
         if self.dropped_non_finite + self.dropped_degenerate > 0 {
             writeln!(
                 out,

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let pose_start = Instant::now();
     let frame = input.pose(&args.moment)?;
     let pose = pose_start.elapsed();
-    check_triangles(&input, &frame)?;
+    check_not_empty(&input, &frame)?;
     let aspect = f64::from(options.width) / f64::from(options.height);
     let view = View::choose(&args.view, &input, &frame, aspect)?;
 
@@ -98,8 +98,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
 }
 
 /// A scene that only lost triangles is no empty scene.
-fn check_triangles(input: &Input, frame: &FrameGeometry) -> Result<(), Failure> {
-    if frame.triangle_count() > 0 {
+fn check_not_empty(input: &Input, frame: &FrameGeometry) -> Result<(), Failure> {
+    if !frame.is_empty() {
         return Ok(());
     }
     let (broken, flat) = (frame.dropped_non_finite, frame.dropped_degenerate);

@@ -36,6 +36,7 @@ pub(crate) struct Summary {
     lights: Vec<String>,
     lights_origin: Origin,
     triangles: usize,
+    solids: usize,
     dropped_non_finite: usize,
     dropped_degenerate: usize,
     structures: Vec<Structure>,
@@ -99,6 +100,7 @@ impl Summary {
             lights: view.lights.iter().map(|light| light.name.clone()).collect(),
             lights_origin: view.lights_origin,
             triangles: stats.triangles,
+            solids: stats.solids,
             dropped_non_finite: stats.dropped_non_finite,
             dropped_degenerate: stats.dropped_degenerate,
             structures: stats.structures.iter().map(Structure::from).collect(),
@@ -141,6 +143,9 @@ impl Summary {
             clean(&self.scene),
             count(self.triangles, "triangle")
         )?;
+        if self.solids > 0 {
+            write!(out, ", {}", count(self.solids, "solid"))?;
+        }
         match self.dropped_non_finite + self.dropped_degenerate {
             0 => writeln!(out)?,
             dropped => writeln!(

@@ -15,6 +15,7 @@ use crate::mean::Mean;
 use crate::plan::FramePlan;
 use crate::reference::EveryTriangle;
 use crate::secondary::{HierarchyBuilder, SecondaryBuilder, SecondaryTracer};
+use crate::solids::{self, FrameSolids};
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
 use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
@@ -112,6 +113,8 @@ impl<'s> Renderer<'s> {
         let secondary = &*self.secondary;
         let mut structures =
             FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options, secondary);
+        let shapes = solids::solids(geometry);
+        let mut solids = FrameSolids::of_frame(&shapes, geometry, first, &plan, options, &mut structures);
         let build = start.elapsed();
 
         let start = Instant::now();
@@ -131,6 +134,7 @@ impl<'s> Renderer<'s> {
         for sample in (0..samples).rev() {
             if sample + 1 < samples {
                 structures.look(shifted(sample), &plan, geometry, clusters, &rules, eye, options);
+                solids = solids.map(|solids| solids.looking(shifted(sample)));
             }
             let shader = TileShader {
                 shader: &self.shader,
@@ -139,6 +143,7 @@ impl<'s> Renderer<'s> {
                 lights: &shading_lights,
                 ends: &plan.lights,
                 structures: &structures,
+                solids: solids.as_ref(),
                 eye,
                 environment,
                 secondary: structures
@@ -218,6 +223,7 @@ fn stats(geometry: &FrameGeometry, options: &RenderOptions, counts: TileCounts) 
         triangles: geometry.triangle_count(),
         dropped_non_finite: geometry.dropped_non_finite,
         dropped_degenerate: geometry.dropped_degenerate,
+        solids: geometry.solids.len(),
         eye_rays: pixels * u64::from(options.pixel_samples.max(1)),
         shadow_rays: counts.shadow_rays,
         secondary_rays: counts.secondary_rays,

@@ -43,6 +43,7 @@ mod plan;
 mod reference;
 mod secondary;
 pub mod shade;
+mod solids;
 mod stats;
 mod structures;
 pub mod texture;
@@ -67,6 +68,7 @@ pub use secondary::{
     BuiltTracer, CubeBuilder, HierarchyBuilder, SecondaryBuilder, SecondaryTracer, SurfaceHit,
 };
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
+pub use solids::solids;
 pub use stats::{FrameStats, StructureStats};
 pub use structures::{FrameStructures, LightShadows};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};

@@ -47,7 +47,6 @@ pub struct RenderOptions {
     /// back faces alone as casters, lights with a size shaded from their middle times the share of samples seen.
     pub paper: bool,
     /// Every ray answered by testing every triangle in f64: the same picture, slowly, to check structures against.
-    /// Frames with a lens or a shutter do not know it.
     pub reference: bool,
     /// Instruction set of the kernels; the picture does not depend on it.
     pub level: SimdLevel,

@@ -5,14 +5,14 @@
 //! |---|---|
 //! | eye rays | one tiled perspective grid (HM08 §5.1) |
 //! | shadow rays of a light | one perspective grid each (HM08 §5.2) |
-//! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3) |
+//! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3); with the papers' parameters one 3-D grid each |
 //! | those of eye and lights through masked and blended surfaces | a grid of these alone for each, if there are any |
 //! | those of lights with a size through them | a hierarchy, if there are both |
 //! | rays that leave surfaces, and the shadow rays of what they meet | the same hierarchy |
 
 use glam::DVec3;
-use rayward_scene::{FrameGeometry, LightKind, Material, ObjectRange, PosedLight, Scene};
-use rayward_trace::{AreaLight, Cone, EyeGridOptions, Light, LightGridOptions};
+use rayward_scene::{FrameGeometry, LightKind, Material, PosedLight, Scene};
+use rayward_trace::{AreaLight, Cone, EyeGridOptions, FaceOptions, Light, LightGridOptions};
 
 use crate::RenderOptions;
 use crate::bounce::GLOSSY;
@@ -40,6 +40,8 @@ pub struct LightPlan {
     pub grid: LightGridOptions,
     /// The light with its size, if it has one: it then has a tree instead of a grid.
     pub area: Option<AreaLight>,
+    /// The cells of the 3-D grid that a light with a size has instead of the tree, if it does.
+    pub soft_grid: Option<FaceOptions>,
 }
 
 /// A spot light wider than this gets the faces of a point light, radians.
@@ -71,6 +73,7 @@ impl FramePlan {
                 light: shadow_end(light, geometry.origin),
                 grid: LightGridOptions { cone, ..grid },
                 area: area_light(light, geometry.origin),
+                soft_grid: options.paper.then(FaceOptions::paper),
             }
         };
         let lights = lights
@@ -92,9 +95,11 @@ impl FramePlan {
         environment: bool,
         options: &RenderOptions,
     ) -> Self {
-        let shown = |object: &ObjectRange| sends_rays(&scene.materials[object.material as usize]);
-        let bounces =
-            options.bounces > 0 && (options.diffuse_bounces > 0 || geometry.objects.iter().any(shown));
+        let shown = |material: u32| sends_rays(&scene.materials[material as usize]);
+        let of_triangles = geometry.objects.iter().map(|object| object.material);
+        let of_solids = geometry.solids.iter().map(|solid| solid.material);
+        let any_shown = || of_triangles.chain(of_solids).any(shown);
+        let bounces = options.bounces > 0 && (options.diffuse_bounces > 0 || any_shown());
         Self {
             secondary: environment || bounces,
             ..self

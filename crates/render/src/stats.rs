@@ -11,6 +11,8 @@ pub struct FrameStats {
     pub dropped_non_finite: usize,
     /// Triangles left out because they had no area.
     pub dropped_degenerate: usize,
+    /// Solids in the frame.
+    pub solids: usize,
     /// The structures built for this frame.
     pub structures: Vec<StructureStats>,
     /// Eye rays traced: one a pixel, or as many as were asked for.

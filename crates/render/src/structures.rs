@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
-    AreaLightTree, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels, LitScratch,
-    PointLightGrid, Receiver, SimdLevel, Tile, Triangles, View, Visibility,
+    AreaLightGrid, AreaLightTree, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels,
+    LitScratch, PointLightGrid, Receiver, SimdLevel, Tile, Triangles, View, Visibility,
 };
 
 use crate::casters::CasterRules;
@@ -34,6 +34,8 @@ pub struct FrameStructures<'g> {
     pub layers: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// The same, for rays that leave surfaces; `None` if nothing sends any.
     pub secondary: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// The same, for the light of solids; `None` without such.
+    pub others: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// The same, if hard shadows of all pixels are asked of it.
     pub shadows: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// Whether any triangle is masked or blended.
@@ -53,6 +55,8 @@ pub enum LightShadows<'g> {
     Pixels(LitPixels),
     /// By samples of its area.
     Area(AreaLightTree<'g>),
+    /// The same through a 3-D grid, as in the paper.
+    AreaGrid(AreaLightGrid<'g>),
     /// By every triangle, for references.
     Reference,
 }
@@ -91,8 +95,9 @@ impl<'g> FrameStructures<'g> {
         let through = (soft || options.reference) && rules.any_transparent();
         // It knows of no triangles that cast by one side alone.
         let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
-        let general =
-            (through || plan.secondary || shadows).then(|| general(triangles, options, builder, &mut stats));
+        let solids = !geometry.solids.is_empty();
+        let general = (through || plan.secondary || shadows || solids)
+            .then(|| general(triangles, options, builder, &mut stats));
         let asked = general.as_deref().filter(|_| shadows);
 
         let mut scratch = LitScratch::default();
@@ -152,9 +157,23 @@ impl<'g> FrameStructures<'g> {
             layers: general.clone().filter(|_| through),
             transparent: rules.any_transparent(),
             secondary: general.clone().filter(|_| plan.secondary),
+            others: general.clone().filter(|_| solids),
             shadows: general.filter(|_| shadows),
             stats: stats.0,
         }
+    }
+
+    /// Builds something else beside these structures and notes its cost; `size` is its bytes, cells and references.
+    pub(crate) fn timed<T>(
+        &mut self,
+        name: &str,
+        build: impl FnOnce() -> T,
+        size: impl FnOnce(&T) -> [usize; 3],
+    ) -> T {
+        let mut stats = Timed(std::mem::take(&mut self.stats));
+        let built = stats.build(name, build, size);
+        self.stats = stats.0;
+        built
     }
 
     /// Looks again with another view of the same camera: all that depends on it is built anew, and not timed.
@@ -302,6 +321,9 @@ fn shadows_of<'g>(
     let triangles = triangles(geometry);
     if let Some(area) = plan.area {
         let rule = rules.for_area(geometry, &area);
+        if let Some(cells) = &plan.soft_grid {
+            return LightShadows::AreaGrid(AreaLightGrid::build(area, triangles, &rule, cells));
+        }
         let tree = AreaLightTree::build(area, triangles, &rule, level);
         return LightShadows::Area(tree.with_topology(rules.topology()));
     }
@@ -348,6 +370,12 @@ impl LightShadows<'_> {
                 tree.bytes(),
                 tree.node_count(),
                 tree.reference_count(),
+            ),
+            Self::AreaGrid(grid) => (
+                "area light grid",
+                grid.bytes(),
+                grid.cell_count(),
+                grid.reference_count(),
             ),
         };
         StructureStats {

@@ -2,12 +2,14 @@
 //! rays are spawned for a tile of hits at a time).
 
 pub(crate) mod soft;
+mod solids;
 
 use std::ops::ControlFlow;
 
 use glam::{Vec2, Vec3};
 use rayward_scene::FrameGeometry;
 use rayward_trace::exact::{self, ExactHit};
+use rayward_trace::solids::SolidHits;
 use rayward_trace::{
     AreaCounts, AreaScratch, Light, Receiver, ShadowScratch, Tile, TileHits, TileVeils, ViewRay,
 };
@@ -18,6 +20,7 @@ use crate::plan::LightPlan;
 use crate::reference::EveryTriangle;
 use crate::secondary::SecondaryTracer;
 use crate::shade::{direct, object_of};
+use crate::solids::{FrameSolids, OnSolid};
 use crate::structures::{FrameStructures, LightShadows};
 use crate::{CameraFrame, Environment, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
@@ -30,6 +33,8 @@ pub(crate) struct TileShader<'f> {
     pub(crate) lights: &'f [ShadingLight],
     pub(crate) ends: &'f [Option<LightPlan>],
     pub(crate) structures: &'f FrameStructures<'f>,
+    /// What is not made of triangles, if anything.
+    pub(crate) solids: Option<&'f FrameSolids<'f>>,
     /// Where the eye rays come from.
     pub(crate) eye: Light,
     pub(crate) environment: Option<&'f Environment>,
@@ -46,6 +51,7 @@ pub(crate) struct TileShader<'f> {
 #[derive(Default)]
 pub(crate) struct TileWork {
     hits: TileHits,
+    solid_hits: SolidHits,
     pub(crate) points: Vec<ShadedPoint>,
     pub(crate) bounce: BounceWork,
     receivers: Vec<Receiver>,
@@ -75,6 +81,7 @@ pub(crate) struct ShadedPoint {
     pub(crate) y: u32,
     pub(crate) surface: Surface,
     pub(crate) receiver: Receiver,
+    pub(crate) on: OnSolid,
     /// Share of the pixel that shows it.
     pub(crate) weight: f32,
     color: Vec3,
@@ -132,7 +139,9 @@ impl TileShader<'_> {
             let opaque = |x, y| structures.seen(&tile, x, y).unwrap_or_else(|| hits.prim(x, y));
             veils.trace_tile(&tile, opaque, &mut work.veils);
         }
+        self.trace_solids(&tile, work);
         work.points.clear();
+        (work.bounce.secondary_rays, work.bounce.shadow_rays) = (0, 0);
         work.scratch.counts = rayward_trace::ShadowCounts::default();
         work.area.counts = AreaCounts::default();
         for [x, y] in in_blocks(tile.width, tile.height) {
@@ -148,6 +157,7 @@ impl TileShader<'_> {
                 },
             }
         }
+        self.illuminate_solids(&tile, work);
         for point in &work.points {
             out.color_row(point.y)[point.x as usize] += point.color * point.weight;
         }
@@ -189,6 +199,8 @@ impl TileShader<'_> {
         seen: &mut Seen,
         work: &mut TileWork,
     ) {
+        let solid = self.solid_at([x, y], ray, work);
+        let solid_t = solid.map_or(f64::INFINITY, |(_, crossing)| crossing.t);
         let TileWork {
             hits, veils, points, ..
         } = work;
@@ -200,7 +212,7 @@ impl TileShader<'_> {
             .structures
             .seen(tile, x, y)
             .unwrap_or_else(|| hits.prim(x, y));
-        for veil in through {
+        for veil in through.iter().take_while(|veil| veil.hit.t <= solid_t) {
             self.note([x, y], ray, veil.prim, &veil.hit, seen, points);
             if seen.left < INVISIBLE {
                 seen.left = 0.0;
@@ -209,8 +221,11 @@ impl TileShader<'_> {
         }
         if let Some(prim) = opaque.filter(|_| seen.left > 0.0)
             && let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))
+            && hit.t <= solid_t
         {
             self.note([x, y], ray, prim, &hit, seen, points);
+        } else if let Some(solid) = solid.filter(|_| seen.left > 0.0) {
+            self.note_solid([x, y], ray, &solid, seen, points);
         }
     }
 
@@ -224,7 +239,9 @@ impl TileShader<'_> {
         work: &mut TileWork,
     ) {
         every.along(ray, &mut work.along);
-        for &(_, prim) in &work.along {
+        let solid = self.solid_at(pixel, ray, work);
+        let solid_t = solid.map_or(f64::INFINITY, |(_, crossing)| crossing.t);
+        for &(_, prim) in work.along.iter().take_while(|(t, _)| *t <= solid_t) {
             let corners = triangles(self.geometry).corners(prim);
             if let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) {
                 self.note(pixel, ray, prim, &hit, seen, &mut work.points);
@@ -233,6 +250,9 @@ impl TileShader<'_> {
                 seen.left = 0.0;
                 break;
             }
+        }
+        if let Some(solid) = solid.filter(|_| seen.left > 0.0) {
+            self.note_solid(pixel, ray, &solid, seen, &mut work.points);
         }
     }
 
@@ -279,6 +299,7 @@ impl TileShader<'_> {
             x,
             y,
             receiver: Receiver::along(ray, hit.t, prim),
+            on: None,
             weight,
             color: self.resting(&surface, 0),
             surface,
@@ -287,10 +308,15 @@ impl TileShader<'_> {
 
     /// Adds the light of one source to all points of the tile that it reaches.
     fn illuminate(&self, light: usize, tile: u32, work: &mut TileWork) {
+        let end = self.ends[light].as_ref().map(|plan| plan.light);
+        let beside_solids =
+            |receiver: &Receiver| !end.is_some_and(|end| self.solid_hides(light, receiver, &end));
         if let LightShadows::Pixels(lit) = &self.structures.lights[light] {
-            for point in &mut work.points {
+            for point in work.points.iter_mut().filter(|point| point.on.is_none()) {
                 let reached = lit.is_lit(tile, point.x, point.y);
-                if let (true, Some(incident)) = (reached, direct(&point.surface, &self.lights[light])) {
+                if let (true, Some(incident)) = (reached, direct(&point.surface, &self.lights[light]))
+                    && beside_solids(&point.receiver)
+                {
                     point.color += incident.radiance;
                 }
             }
@@ -310,8 +336,10 @@ impl TileShader<'_> {
         receivers.clear();
         asked.clear();
         for (i, point) in points.iter().enumerate() {
-            if let Some(incident) = direct(&point.surface, &self.lights[light])
+            if point.on.is_none()
+                && let Some(incident) = direct(&point.surface, &self.lights[light])
                 && self.faces(light, &point.receiver)
+                && beside_solids(&point.receiver)
             {
                 receivers.push(point.receiver);
                 asked.push((i as u32, incident.radiance));
@@ -320,7 +348,10 @@ impl TileShader<'_> {
         match &self.structures.lights[light] {
             LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
             LightShadows::Reference => self.shadowed_by_any(light, receivers, shadow),
-            LightShadows::Nothing | LightShadows::Pixels(_) | LightShadows::Area(_) => {
+            LightShadows::Nothing
+            | LightShadows::Pixels(_)
+            | LightShadows::Area(_)
+            | LightShadows::AreaGrid(_) => {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
             }

@@ -97,6 +97,19 @@ fn render(
 }
 
 fn check(name: &str, size: [u32; 2], lights: impl Fn(&FrameGeometry) -> Vec<PosedLight>, samples: u32) {
+    let options = RenderOptions {
+        samples,
+        ..RenderOptions::default()
+    };
+    check_with(name, size, lights, options);
+}
+
+fn check_with(
+    name: &str,
+    size: [u32; 2],
+    lights: impl Fn(&FrameGeometry) -> Vec<PosedLight>,
+    options: RenderOptions,
+) {
     let scene = builtin::build(name).expect("it exists");
     let geometry = scene.at(0.0);
     let lights = lights(&geometry);
@@ -104,10 +117,9 @@ fn check(name: &str, size: [u32; 2], lights: impl Fn(&FrameGeometry) -> Vec<Pose
     let options = RenderOptions {
         width: size[0],
         height: size[1],
-        samples,
         seed: 3,
         bounces: 0,
-        ..RenderOptions::default()
+        ..options
     };
     let frame = CameraFrame::new(&camera, geometry.origin, size[0], size[1]).expect("valid camera");
     let view = frame.view(&geometry);
@@ -181,6 +193,22 @@ fn closed_models() {
         |g| vec![light(g, Vec3::new(0.7, 1.5, 0.7), SQUARE)],
         8,
     );
+}
+
+#[test]
+fn the_papers_grid() {
+    let options = RenderOptions {
+        samples: 6,
+        paper: true,
+        ..RenderOptions::default()
+    };
+    let lights = |g: &FrameGeometry| {
+        vec![
+            light(g, Vec3::new(0.7, 1.5, 0.7), SQUARE),
+            light(g, Vec3::new(-0.5, 0.9, 1.2), LightKind::Point { radius: 0.3 }),
+        ]
+    };
+    check_with("blob-1k", [64, 48], lights, options);
 }
 
 #[test]

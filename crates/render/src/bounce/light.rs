@@ -11,18 +11,19 @@
 use std::ops::ControlFlow;
 
 use glam::Vec3;
-use rayward_trace::{AreaLight, Light, Receiver, exact};
+use rayward_trace::{AreaLight, Light, exact};
 
 use super::{Arrival, BounceWork, Flight, SURROUNDING};
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
 use crate::shade::{Traced, brdf, direct, direct_from, lobes};
+use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
 
 impl TileShader<'_> {
     /// Adds the light of all sources to the arrivals that they reach.
-    pub(super) fn illuminate_arrivals(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork) {
+    pub(crate) fn illuminate_arrivals(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork) {
         for (index, (light, end)) in self.lights.iter().zip(self.ends).enumerate() {
             for arrival in &mut work.arrivals {
                 let Some(plan) = end else {
@@ -35,10 +36,11 @@ impl TileShader<'_> {
                     let (light, filters) = ((index, light, area), &mut work.filters);
                     arrival.color += self.soft_light(tracer, arrival, light, filters, &mut work.shadow_rays);
                 } else if let Some(incident) = direct(&arrival.surface, light)
-                    && self.is_turned_to(&plan.light, &arrival.receiver, &arrival.seen_from)
+                    && self.is_turned_to(&plan.light, arrival)
                 {
                     work.shadow_rays += 1;
-                    let passed = self.passed(tracer, &arrival.receiver, &plan.light, &mut work.filters);
+                    let end = (Some(index), &plan.light);
+                    let passed = self.passed(tracer, arrival, end, &mut work.filters);
                     arrival.color += incident.radiance * passed;
                 }
             }
@@ -61,14 +63,16 @@ impl TileShader<'_> {
             return Vec3::ZERO;
         }
         let samples = soft::samples(self.options, index, self.sample);
+        // What the eye sees of solids is lit in the paper's way where triangles are.
+        let whole = (self.options.paper && arrival.bounces == 0).then(|| direct(surface, light));
         let mut sum = Vec3::ZERO;
         for k in 0..samples.count() {
             let end = area.sample(&samples, arrival.path.0, receiver.point, k);
-            if let Some(incident) = direct_from(surface, light, area, &end)
-                && self.is_turned_to(&end, receiver, &arrival.seen_from)
+            if let Some(incident) = whole.unwrap_or_else(|| direct_from(surface, light, area, &end))
+                && self.is_turned_to(&end, arrival)
             {
                 *asked += 1;
-                sum += incident.radiance * self.passed(tracer, receiver, &end, filters);
+                sum += incident.radiance * self.passed(tracer, arrival, (Some(index), &end), filters);
             }
         }
         sum / samples.count() as f32
@@ -104,7 +108,7 @@ impl TileShader<'_> {
                 }
                 work.shadow_rays += 1;
                 let end = Light::Directional(towards);
-                arrival.color += lit * self.passed(tracer, &arrival.receiver, &end, &mut work.filters);
+                arrival.color += lit * self.passed(tracer, arrival, (None, &end), &mut work.filters);
             }
         }
     }
@@ -127,17 +131,22 @@ impl TileShader<'_> {
         }
     }
 
-    /// Share of a light that reaches a receiver.
+    /// Share of a light, which has an index if it is one of the scene's, that reaches an arrival.
     fn passed(
         &self,
         tracer: &dyn SecondaryTracer,
-        receiver: &Receiver,
-        end: &Light,
+        arrival: &Arrival,
+        (light, end): (Option<usize>, &Light),
         filters: &mut Vec<u32>,
     ) -> Vec3 {
         if !self.options.shadows {
             return Vec3::ONE;
         }
+        let hides = |solids: &FrameSolids| solids.hides(light, &arrival.among_solids(), end);
+        if self.solids.is_some_and(hides) {
+            return Vec3::ZERO;
+        }
+        let receiver = &arrival.receiver;
         filters.clear();
         let some_pass = self.structures.transparent;
         let mut blocked = false;
@@ -156,10 +165,17 @@ impl TileShader<'_> {
         self.let_through(receiver, end, filters)
     }
 
-    /// Whether a light is on the side of a receiver's triangle that is seen from a place.
-    fn is_turned_to(&self, end: &Light, receiver: &Receiver, seen_from: &Light) -> bool {
-        let corners = triangles(self.geometry).corners(receiver.prim);
-        let (lit, seen) = (exact::side(corners, end), exact::side(corners, seen_from));
+    /// Whether a light is on the side of an arrival's triangle that is seen. What faces the light on a solid is told by its
+    /// normal alone, which is that of shading.
+    fn is_turned_to(&self, end: &Light, arrival: &Arrival) -> bool {
+        if arrival.on.is_some() {
+            return true;
+        }
+        let corners = triangles(self.geometry).corners(arrival.receiver.prim);
+        let (lit, seen) = (
+            exact::side(corners, end),
+            exact::side(corners, &arrival.seen_from),
+        );
         (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
     }
 }

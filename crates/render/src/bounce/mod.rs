@@ -19,12 +19,14 @@
 mod light;
 
 use glam::Vec3;
+use rayward_trace::solids::{Crossing, SolidReceiver};
 use rayward_trace::{Light, Receiver, Samples, SurfaceRay, Tile, ViewRay, exact};
 
 use crate::secondary::{SecondaryTracer, SurfaceHit};
 use crate::shade::lobes::{self, Lobe};
 use crate::shade::{Traced, around, brdf, object_of};
-use crate::tile::{TileShader, TileWork};
+use crate::solids::OnSolid;
+use crate::tile::{ShadedPoint, TileShader, TileWork};
 use crate::{Surface, SurfacePoint, TileMut};
 
 /// Roughness above which reflections of surfaces are not traced unless diffuse light is.
@@ -60,6 +62,8 @@ struct Flight {
     /// Share of what it meets that the pixel shows.
     weight: Vec3,
     ray: SurfaceRay,
+    /// The solid it starts on, if any.
+    on: OnSolid,
     /// Density with which its direction was drawn, and how many directions were drawn from the environment there.
     density: f32,
     drawn: f32,
@@ -74,6 +78,17 @@ struct Flight {
     path: Path,
 }
 
+impl Flight {
+    /// Absorption on the way to a surface. A ray that leaves a volume it did not enter has been in it from the start.
+    fn absorption_until(&self, surface: &Surface) -> Vec3 {
+        if !surface.front && !surface.thin && self.absorption == Vec3::ZERO {
+            surface.absorption * surface.transmission.ceil()
+        } else {
+            self.absorption
+        }
+    }
+}
+
 /// Width of the pixel's footprint along a ray, metres, and its growth per metre.
 #[derive(Clone, Copy, Debug)]
 struct Cone {
@@ -83,11 +98,12 @@ struct Cone {
 
 /// A surface that a path has come to.
 #[derive(Clone, Copy, Debug)]
-struct Arrival {
+pub(crate) struct Arrival {
     pixel: [u32; 2],
     weight: Vec3,
     surface: Surface,
     receiver: Receiver,
+    on: OnSolid,
     bounces: u32,
     cone: Cone,
     path: Path,
@@ -96,7 +112,17 @@ struct Arrival {
     /// From where the surface is seen.
     seen_from: Light,
     /// Light it sends back along the path.
-    color: Vec3,
+    pub(crate) color: Vec3,
+}
+
+impl Arrival {
+    /// The point as a receiver of what solids cast.
+    fn among_solids(&self) -> SolidReceiver {
+        SolidReceiver {
+            on: self.on,
+            ..SolidReceiver::from(&self.receiver)
+        }
+    }
 }
 
 /// Working memory of one thread.
@@ -106,7 +132,7 @@ pub(crate) struct BounceWork {
     next: Vec<Flight>,
     rays: Vec<SurfaceRay>,
     hits: Vec<SurfaceHit>,
-    arrivals: Vec<Arrival>,
+    pub(crate) arrivals: Vec<Arrival>,
     filters: Vec<u32>,
     /// Rays from surfaces to others, and to lights and the environment.
     pub(crate) secondary_rays: u64,
@@ -170,29 +196,34 @@ impl TileShader<'_> {
             return;
         };
         let TileWork { points, bounce, .. } = work;
-        (bounce.secondary_rays, bounce.shadow_rays) = (0, 0);
         bounce.arrivals.clear();
-        bounce.arrivals.extend(points.iter().map(|point| {
-            let depth = (point.receiver.point - self.camera.eye.as_dvec3()).dot(self.camera.forward);
-            let [x, y] = [tile.x + point.x, tile.y + point.y];
-            Arrival {
-                pixel: [point.x, point.y],
-                weight: Vec3::splat(point.weight),
-                surface: point.surface,
-                receiver: point.receiver,
-                bounces: 0,
-                cone: self.cone(depth as f32),
-                path: Path(y.wrapping_mul(self.camera.width).wrapping_add(x)),
-                absorption: Vec3::ZERO,
-                seen_from: self.eye,
-                color: Vec3::ZERO,
-            }
-        }));
+        bounce
+            .arrivals
+            .extend(points.iter().map(|point| self.arrival(tile, point)));
         self.surround(tracer, bounce, self.options.environment_samples);
         for arrival in &bounce.arrivals {
             add(out, arrival.pixel, arrival.weight * arrival.color);
         }
         self.follow(tracer, bounce, out);
+    }
+
+    /// A point that the eye sees as one where paths begin, without its light.
+    pub(crate) fn arrival(&self, tile: &Tile, point: &ShadedPoint) -> Arrival {
+        let depth = (point.receiver.point - self.camera.eye.as_dvec3()).dot(self.camera.forward);
+        let [x, y] = [tile.x + point.x, tile.y + point.y];
+        Arrival {
+            pixel: [point.x, point.y],
+            weight: Vec3::splat(point.weight),
+            surface: point.surface,
+            receiver: point.receiver,
+            on: point.on,
+            bounces: 0,
+            cone: self.cone(depth as f32),
+            path: Path(y.wrapping_mul(self.camera.width).wrapping_add(x)),
+            absorption: Vec3::ZERO,
+            seen_from: self.eye,
+            color: Vec3::ZERO,
+        }
     }
 
     /// The footprint of a pixel where its ray has this depth.
@@ -222,6 +253,11 @@ impl TileShader<'_> {
             work.arrivals.clear();
             work.next.clear();
             for (flight, hit) in work.flights.iter().zip(&work.hits) {
+                let end = hit.map_or(f64::INFINITY, |(_, hit)| hit.t);
+                if let Some(solid) = self.solid_before(flight, end) {
+                    self.arrive_on_solid(flight, &solid, &mut work.arrivals);
+                    continue;
+                }
                 match hit {
                     Some(hit) => self.arrive(flight, hit, &mut work.arrivals, &mut work.next),
                     None => add(out, flight.pixel, flight.weight * self.beyond(flight)),
@@ -261,12 +297,7 @@ impl TileShader<'_> {
                 footprint: cone.width,
             },
         );
-        // A ray that leaves a volume it did not enter has been in it from the start.
-        let inside = if !surface.front && !surface.thin && flight.absorption == Vec3::ZERO {
-            surface.absorption * surface.transmission.ceil()
-        } else {
-            flight.absorption
-        };
+        let inside = flight.absorption_until(&surface);
         let weight = flight.weight * absorbed(inside, distance);
         let receiver = Receiver::along(&flight.ray.line(), hit.t, prim);
         if surface.alpha < 1.0 && flight.passed < MOST_PASSED {
@@ -276,6 +307,7 @@ impl TileShader<'_> {
                     from: receiver,
                     dir: flight.ray.dir,
                 },
+                on: None,
                 passed: flight.passed + 1,
                 absorption: inside,
                 cone,
@@ -287,6 +319,7 @@ impl TileShader<'_> {
                 pixel: flight.pixel,
                 weight: weight * surface.alpha,
                 receiver,
+                on: None,
                 bounces: flight.bounces,
                 cone,
                 path: flight.path,
@@ -296,6 +329,48 @@ impl TileShader<'_> {
                 surface,
             });
         }
+    }
+
+    /// The solid that a ray meets before this parameter.
+    fn solid_before(&self, flight: &Flight, end: f64) -> Option<(u32, Crossing)> {
+        let ray = flight.ray.line();
+        let start = flight.ray.from.error / ray.dir.length();
+        let found = self.solids?.closest(&ray, [start, end], flight.on)?;
+        (found.1.t < end).then_some(found)
+    }
+
+    /// As [`Self::arrive`], where the ray meets a solid.
+    fn arrive_on_solid(
+        &self,
+        flight: &Flight,
+        (id, crossing): &(u32, Crossing),
+        arrivals: &mut Vec<Arrival>,
+    ) {
+        let Some(solids) = self.solids else { return };
+        let length = flight.ray.dir.length();
+        let distance = crossing.t as f32 * length;
+        let receiver = solids.receiver(&flight.ray.line(), *id, crossing);
+        let view = -flight.ray.dir / length;
+        let surface = self
+            .shader
+            .solid_surface(solids.material(*id), receiver.point, crossing, view);
+        let inside = flight.absorption_until(&surface);
+        arrivals.push(Arrival {
+            pixel: flight.pixel,
+            weight: flight.weight * absorbed(inside, distance),
+            receiver: receiver.among_triangles(),
+            on: receiver.on,
+            bounces: flight.bounces,
+            cone: Cone {
+                width: flight.cone.width + flight.cone.spread * distance,
+                ..flight.cone
+            },
+            path: flight.path,
+            absorption: inside,
+            seen_from: flight.ray.looked_at_from(),
+            color: self.resting(&surface, flight.bounces),
+            surface,
+        });
     }
 
     /// Sends out the rays of all lobes of a surface that are traced.
@@ -385,6 +460,7 @@ impl TileShader<'_> {
                     from: arrival.receiver,
                     dir: lobe.towards,
                 },
+                on: arrival.on,
                 density: lobe.density * rays as f32,
                 drawn,
                 bounces: arrival.bounces + 1,

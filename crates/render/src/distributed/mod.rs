@@ -12,7 +12,9 @@
 //! Every decision is exact at its own time, and a pixel's samples depend on its place alone, so the picture is the same
 //! for any number of threads. Layers but colour and alpha show the middle of the pixel and of the lens when the
 //! shutter opens. Limits: lights stand still while the shutter is open; triangles are those that have area when it opens; all
-//! triangles cast shadows from both sides.
+//! triangles cast shadows from both sides; surfaces send out no rays of their own.
+
+mod light;
 
 use std::borrow::Cow;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,18 +23,23 @@ use std::time::Instant;
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use rayward_scene::{AlphaMode, FrameGeometry, PosedCamera, PosedLight, Scene};
-use rayward_trace::exact::{self, ExactHit};
-use rayward_trace::{Candidates, FaceOptions, Light, MovingAt, MovingGrids, MovingTriangles, Ray, Receiver};
+use rayward_trace::exact::ExactHit;
+use rayward_trace::solids::{Crossing, Solid, SolidGrids, SolidReceiver};
+use rayward_trace::{
+    Candidates, FaceOptions, Light, MovingAt, MovingGrids, MovingTriangles, Ray, Receiver, ViewRay,
+};
 
 use crate::geometry::triangles;
 use crate::lens::{Lens, MovingCamera};
 use crate::pixel_samples::PixelSample;
-use crate::plan::FramePlan;
-use crate::shade::{ambient, direct, object_of};
+use crate::plan::{FramePlan, LightPlan};
+use crate::shade::object_of;
+use crate::solids::{self, first_ids};
 use crate::{
     CameraFrame, Error, Film, FrameStats, Layers, Progress, RenderOptions, RenderedFrame, Result, Sample,
     Shader, ShadingLight, StructureStats, Surface, SurfacePoint, TileMut,
 };
+use light::{FrameLight, RayIndex, Seen};
 
 /// Where everything is when the shutter closes.
 #[derive(Clone, Copy, Debug)]
@@ -60,8 +67,9 @@ struct Frame<'f> {
     camera: MovingCamera<'f>,
     moving: MovingTriangles<'f>,
     eye: MovingGrids<'f>,
-    /// The lights, where their shadow rays end, and the grids around them.
-    lights: Vec<(ShadingLight, Option<Light>, Option<MovingGrids<'f>>)>,
+    /// Grids of solids around the eye, if there are any.
+    solids: Option<SolidGrids<'f>>,
+    lights: Vec<FrameLight<'f>>,
     /// Whether each material is masked or blended; empty if none is.
     transparent: Vec<bool>,
     options: &'f RenderOptions,
@@ -96,6 +104,7 @@ pub(crate) fn render(
         triangles: geometry.triangle_count(),
         dropped_non_finite: geometry.dropped_non_finite,
         dropped_degenerate: geometry.dropped_degenerate,
+        solids: geometry.solids.len(),
         eye_rays: u64::from(options.width)
             * u64::from(options.height)
             * u64::from(options.pixel_samples.max(1)),
@@ -104,19 +113,14 @@ pub(crate) fn render(
     let closing = closing(geometry, close.geometry);
     let moving = MovingTriangles::new(triangles(geometry), triangles(&closing));
     let middle = (camera_open.eye.as_dvec3() + camera_close.eye.as_dvec3()) * 0.5;
-    let eye = grids(middle, moving, "grids around the eye".into(), &mut stats);
-    let plan = FramePlan::new(geometry, lights, options);
-    let lights = lights.iter().zip(&plan.lights).map(|(light, plan)| {
-        let end = plan.as_ref().map(|plan| plan.light);
-        let own = match end {
-            Some(Light::Point(position)) => {
-                let name = format!("grids around light {:?}", light.name);
-                Some(grids(position.as_dvec3(), moving, name, &mut stats))
-            }
-            _ => None,
-        };
-        (ShadingLight::new(light, geometry.origin), end, own)
-    });
+    let shapes = [geometry, close.geometry].map(solids::solids);
+    let movers = Movers {
+        triangles: moving,
+        solids: &shapes,
+        reference: options.reference,
+    };
+    let eye = movers.grids(middle, "grids around the eye".into(), &mut stats);
+    let frame_lights = movers.lights((geometry, lights), options, &mut stats);
     let frame = Frame {
         shader,
         open: geometry,
@@ -128,7 +132,8 @@ pub(crate) fn render(
         },
         moving,
         eye,
-        lights: lights.collect(),
+        solids: movers.solid_grids(middle),
+        lights: frame_lights,
         transparent: transparent(scene, geometry),
         options,
     };
@@ -181,22 +186,70 @@ fn check(camera: &PosedCamera, lens: Option<Lens>) -> Result<()> {
     })
 }
 
-fn grids<'g>(
-    center: DVec3,
-    moving: MovingTriangles<'g>,
-    name: String,
-    stats: &mut FrameStats,
-) -> MovingGrids<'g> {
-    let start = Instant::now();
-    let grids = MovingGrids::build(center, moving, SLICES, &FaceOptions::default());
-    stats.structures.push(StructureStats {
-        name,
-        build: start.elapsed(),
-        bytes: grids.bytes(),
-        cells: grids.cell_count(),
-        references: grids.reference_count(),
-    });
-    grids
+/// What moves while the shutter is open.
+#[derive(Clone, Copy)]
+struct Movers<'f> {
+    triangles: MovingTriangles<'f>,
+    solids: &'f [Vec<Solid>; 2],
+    /// Whether every triangle and every solid is tested.
+    reference: bool,
+}
+
+impl<'f> Movers<'f> {
+    fn grids(self, center: DVec3, name: String, stats: &mut FrameStats) -> MovingGrids<'f> {
+        if self.reference {
+            return MovingGrids::every(self.triangles);
+        }
+        let start = Instant::now();
+        let grids = MovingGrids::build(center, self.triangles, SLICES, &FaceOptions::default());
+        stats.structures.push(StructureStats {
+            name,
+            build: start.elapsed(),
+            bytes: grids.bytes(),
+            cells: grids.cell_count(),
+            references: grids.reference_count(),
+        });
+        grids
+    }
+
+    /// None without solids.
+    fn solid_grids(self, center: DVec3) -> Option<SolidGrids<'f>> {
+        let [open, close] = self.solids;
+        if open.is_empty() {
+            return None;
+        }
+        Some(if self.reference {
+            SolidGrids::every([open, close])
+        } else {
+            SolidGrids::moving(center, [open, close], &FaceOptions::default())
+        })
+    }
+
+    /// All lights with what is around those that have a place.
+    fn lights(
+        self,
+        (geometry, lights): (&FrameGeometry, &[PosedLight]),
+        options: &RenderOptions,
+        stats: &mut FrameStats,
+    ) -> Vec<FrameLight<'f>> {
+        let plan = FramePlan::new(geometry, lights, options);
+        let light = |(light, plan): (&PosedLight, &Option<LightPlan>)| {
+            let end = plan.as_ref().map(|plan| plan.light);
+            let place = end.and_then(|end| match end {
+                Light::Point(position) => Some(position.as_dvec3()),
+                Light::Directional(_) => None,
+            });
+            let name = || format!("grids around light {:?}", light.name);
+            FrameLight {
+                shading: ShadingLight::new(light, geometry.origin),
+                end,
+                area: plan.as_ref().and_then(|plan| plan.area),
+                grids: place.map(|place| self.grids(place, name(), stats)),
+                solids: place.and_then(|place| self.solid_grids(place)),
+            }
+        };
+        lights.iter().zip(&plan.lights).map(light).collect()
+    }
 }
 
 fn transparent(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
@@ -209,6 +262,13 @@ fn transparent(scene: &Scene, geometry: &FrameGeometry) -> Vec<bool> {
         return Vec::new();
     }
     (0..scene.materials.len()).map(transparent).collect()
+}
+
+fn line(ray: &Ray) -> ViewRay {
+    ViewRay {
+        origin: ray.origin.as_dvec3(),
+        dir: ray.dir.as_dvec3(),
+    }
 }
 
 impl Frame<'_> {
@@ -226,7 +286,12 @@ impl Frame<'_> {
                 (pixel.color, pixel.alpha) = (Vec3::ZERO, 0.0);
                 for index in 0..samples {
                     let sample = PixelSample::new(px, py, index);
-                    let (color, alpha) = self.radiance(&self.camera.ray(px, py, &sample), sample.time, work);
+                    let place = RayIndex {
+                        pixel: py * self.options.width + px,
+                        sample: index,
+                        time: sample.time,
+                    };
+                    let (color, alpha) = self.radiance(&self.camera.ray(px, py, &sample), place, work);
                     pixel.color += color * share;
                     pixel.alpha += alpha * share;
                 }
@@ -243,7 +308,23 @@ impl Frame<'_> {
             time: 0.0,
         };
         let ray = self.camera.ray(x, y, &middle);
-        let Some(&(prim, hit)) = self.see(&ray, &self.eye.at(0.0), work) else {
+        let first = self.see(&ray, &self.eye.at(0.0), work).copied();
+        let end = first.map_or(f64::INFINITY, |(_, hit)| hit.t);
+        if let Some((id, crossing)) = self.solid_before(&ray, 0.0, end) {
+            let [object, prim] = first_ids(self.open).map(|first| first + id);
+            let depth = crossing.t as f32;
+            return Sample {
+                color: Vec3::ZERO,
+                alpha: 0.0,
+                depth,
+                distance: depth * ray.dir.length(),
+                normal: self.solid_surface(&ray, 0.0, id, &crossing).0.normal,
+                object,
+                prim,
+                bary: Vec2::ZERO,
+            };
+        }
+        let Some((prim, hit)) = first else {
             return Sample::background(Vec3::ZERO);
         };
         let depth = hit.t as f32;
@@ -273,16 +354,30 @@ impl Frame<'_> {
     }
 
     /// Colour and coverage that one ray sees.
-    fn radiance(&self, ray: &Ray, time: f64, work: &mut Work) -> (Vec3, f32) {
+    fn radiance(&self, ray: &Ray, place: RayIndex, work: &mut Work) -> (Vec3, f32) {
+        let time = place.time;
         let now = self.eye.at(time);
         self.see(ray, &now, work);
         let hits = std::mem::take(&mut work.hits);
+        // Where all is opaque there is one hit at most.
+        let end = match hits.last() {
+            Some((_, hit)) if self.transparent.is_empty() => hit.t,
+            _ => f64::INFINITY,
+        };
+        let solid = self.solid_before(ray, time, end);
+        let solid_t = solid.map_or(f64::INFINITY, |(_, crossing)| crossing.t);
         let (mut color, mut left) = (Vec3::ZERO, 1.0);
-        for (prim, hit) in &hits {
+        for (prim, hit) in hits.iter().take_while(|(_, hit)| hit.t <= solid_t) {
             let surface = self.surface(ray, time, *prim, hit);
             let weight = left * surface.alpha;
             if weight > 0.0 {
-                color += self.shaded(ray, time, *prim, hit, &surface, work) * weight;
+                let seen = Seen {
+                    surface: &surface,
+                    receiver: Receiver::on_surface(ray, hit.t, *prim),
+                    on: None,
+                    from: Light::Point(ray.origin),
+                };
+                color += self.shaded(&seen, place, work) * weight;
                 left -= weight;
             }
             if left < INVISIBLE {
@@ -291,7 +386,38 @@ impl Frame<'_> {
             }
         }
         work.hits = hits;
+        if let Some((id, crossing)) = solid.filter(|_| left > 0.0) {
+            let (surface, receiver) = self.solid_surface(ray, time, id, &crossing);
+            let seen = Seen {
+                surface: &surface,
+                receiver: receiver.among_triangles(),
+                on: receiver.on,
+                from: Light::Point(ray.origin),
+            };
+            color += self.shaded(&seen, place, work) * left;
+            left = 0.0;
+        }
         (color + self.options.background * left, 1.0 - left)
+    }
+
+    /// The solid that a ray meets before this parameter.
+    fn solid_before(&self, ray: &Ray, time: f64, end: f64) -> Option<(u32, Crossing)> {
+        let solids = self.solids.as_ref()?.at(time);
+        let found = solids.closest(&line(ray), [0.0, end], None, &mut ())?;
+        (found.1.t < end).then_some(found)
+    }
+
+    /// The surface of a solid where a ray crosses it.
+    fn solid_surface(&self, ray: &Ray, time: f64, id: u32, crossing: &Crossing) -> (Surface, SolidReceiver) {
+        let solid = self.solids.as_ref().map(|solids| solids.at(time).solid(id));
+        let solid = solid.expect("it has been met");
+        let receiver = SolidReceiver::along(&line(ray), id, &solid, crossing);
+        let material = self.open.solids[id as usize].material;
+        let view = (-ray.dir).normalize();
+        let surface = self
+            .shader
+            .solid_surface(material, receiver.point, crossing, view);
+        (surface, receiver)
     }
 
     /// The surface at a hit at a time. Attributes that move are between those of the shutter's two ends.
@@ -335,61 +461,5 @@ impl Frame<'_> {
             front: side > 0.0,
             ..opening
         }
-    }
-
-    /// What a surface sends back along the ray.
-    fn shaded(
-        &self,
-        ray: &Ray,
-        time: f64,
-        prim: u32,
-        hit: &ExactHit,
-        surface: &Surface,
-        work: &mut Work,
-    ) -> Vec3 {
-        let mut color = ambient(surface, self.options.ambient);
-        let receiver = Receiver::on_surface(ray, hit.t, prim);
-        let corners = self.moving.corners(prim, time);
-        let seen = exact::side(corners, &Light::Point(ray.origin));
-        for (light, end, grids) in &self.lights {
-            let Some(incident) = direct(surface, light) else {
-                continue;
-            };
-            let Some(end) = end else {
-                color += incident.radiance;
-                continue;
-            };
-            let lit = exact::side(corners, end);
-            if !((lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)) {
-                continue;
-            }
-            work.shadow_rays += 1;
-            let now = grids.as_ref().unwrap_or(&self.eye).at(time);
-            color += incident.radiance * self.passed(&now, &receiver, end, work);
-        }
-        color
-    }
-
-    /// Share of a light that reaches a receiver.
-    fn passed(&self, now: &MovingAt, receiver: &Receiver, light: &Light, work: &mut Work) -> Vec3 {
-        if self.transparent.is_empty() {
-            let lit = !now.shadows(receiver, light, &mut ());
-            return Vec3::splat(f32::from(u8::from(lit)));
-        }
-        let (origin, dir) = exact::shadow_line(receiver, light);
-        let tinted = self.options.tinted_shadows;
-        now.blockers(receiver, light, &mut (), &mut work.blockers);
-        let mut passed = Vec3::ONE;
-        for &prim in &work.blockers {
-            let object = object_of(self.open, prim);
-            if !self.transparent[self.open.objects[object as usize].material as usize] {
-                return Vec3::ZERO;
-            }
-            if let Some(hit) = exact::attributes(origin, dir, now.corners(prim)) {
-                let place = [hit.u as f32, hit.v as f32];
-                passed *= self.shader.transmittance(self.open, prim, object, place, tinted);
-            }
-        }
-        passed
     }
 }

@@ -8,9 +8,10 @@
 //! Textures are filtered by the footprint of the pixel on the surface (Akenine-Möller et al., "Texture Level of
 //! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce).
 
-use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
+use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
+use rayward_trace::solids::Crossing;
 
 use crate::casters::is_thin_glass;
 use crate::texture::{Encoding, Texture, Textures};
@@ -424,6 +425,40 @@ impl<'s> Shader<'s> {
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             unlit: material.unlit,
             front,
+        }
+    }
+
+    /// The surface of a solid where a ray crosses it. A solid has a volume, whatever the thickness of its material, and no
+    /// texture coordinates.
+    pub(crate) fn solid_surface(
+        &self,
+        material: u32,
+        position: DVec3,
+        crossing: &Crossing,
+        view: Vec3,
+    ) -> Surface {
+        let material = &self.materials[material as usize];
+        let outward = crossing.normal.as_vec3();
+        let normal = if crossing.enters { outward } else { -outward };
+        Surface {
+            position: position.as_vec3(),
+            geometric_normal: normal,
+            normal,
+            view,
+            base_color: material.base_color.xyz(),
+            alpha: 1.0,
+            metallic: material.metallic.clamp(0.0, 1.0),
+            roughness: material.roughness.clamp(0.0, 1.0),
+            f0: (material.ior_reflectance * material.specular_color).min(Vec3::ONE),
+            specular: material.specular,
+            transmission: material.transmission,
+            ior: material.ior,
+            thin: false,
+            absorption: material.absorption,
+            emissive: material.emissive,
+            occlusion: 1.0,
+            unlit: material.unlit,
+            front: crossing.enters,
         }
     }
 

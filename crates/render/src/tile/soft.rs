@@ -55,7 +55,7 @@ impl TileShader<'_> {
             } else {
                 (!point.surface.unlit).then_some(Vec3::ZERO)
             };
-            if let Some(radiance) = radiance
+            if let Some(radiance) = radiance.filter(|_| point.on.is_none())
                 && area.shines_at(point.receiver.point)
                 && self.may_face(area, &point.receiver)
             {
@@ -73,6 +73,13 @@ impl TileShader<'_> {
         }
         match (&self.structures.lights[light], &self.reference) {
             (LightShadows::Area(tree), _) => tree.visible(
+                &work.receivers,
+                &work.pixels,
+                &samples,
+                &mut work.area,
+                &mut work.visible,
+            ),
+            (LightShadows::AreaGrid(grid), _) => grid.visible(
                 &work.receivers,
                 &work.pixels,
                 &samples,
@@ -109,7 +116,9 @@ impl TileShader<'_> {
                 } else {
                     direct_from(surface, &self.lights[light], area, &end).map(|incident| incident.radiance)
                 };
-                if let Some(sent) = sent {
+                if let Some(sent) = sent
+                    && !self.solid_hides(light, &receiver, &end)
+                {
                     let passed = match self.structures.layers.as_deref() {
                         Some(all) => self.transmittance(all, &receiver, &end, &mut work.filters),
                         None => Vec3::ONE,
