@@ -78,8 +78,8 @@ impl TileShader<'_> {
         sum / samples.count() as f32
     }
 
-    /// Adds the light of the environment to all arrivals, by this many directions each.
-    pub(super) fn surround(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork, directions: u32) {
+    /// Adds the light of the environment to all arrivals.
+    pub(super) fn surround(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork) {
         let Some(environment) = self.environment else {
             return;
         };
@@ -90,9 +90,10 @@ impl TileShader<'_> {
             }
             let traced = self.traced(surface, arrival.bounces);
             let rays = [
-                self.reflected_rays(surface, arrival.bounces),
-                self.diffused_rays(surface, arrival.bounces),
+                self.reflected_rays(surface, arrival.sharp),
+                self.diffused_rays(surface, arrival.sharp),
             ];
+            let directions = self.directions(arrival.sharp);
             for i in 0..directions {
                 let random = self.draw(arrival.path, SURROUNDING, self.sample * directions + i);
                 let sample = environment.sample(random);

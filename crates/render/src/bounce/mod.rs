@@ -3,8 +3,9 @@
 //!
 //! They go in waves, one a bounce: all rays of the tile are traced together, the surfaces they meet are lit, and send
 //! out the next wave. A surface that both reflects and transmits sends out both rays; none is dropped by chance, only
-//! where less than [`FAINT`] of the pixel is left. Rough lobes of what the eye sees draw as many rays as a light with
-//! a size has samples, times the share of light that they pass on; those of later surfaces draw one.
+//! where less than [`FAINT`] of the pixel is left. The first rough surface that is seen, by the eye or in mirrors and
+//! through clear glass, draws as many rays for a lobe as a light with a size has samples, times the share of the pixel
+//! that they bring light to; later surfaces draw one.
 //!
 //! ```text
 //! depart: surface --lobes--> flights --SecondaryTracer--> arrive: surface --light--> lit, departs again
@@ -61,6 +62,8 @@ struct Flight {
     pixel: [u32; 2],
     /// Share of what it meets that the pixel shows.
     weight: Vec3,
+    /// The same while only smooth lobes were on its way, else 0.
+    sharp: f32,
     ray: SurfaceRay,
     /// The solid it starts on, if any.
     on: OnSolid,
@@ -101,6 +104,8 @@ struct Cone {
 pub(crate) struct Arrival {
     pixel: [u32; 2],
     weight: Vec3,
+    /// Share of the pixel that shows the surface by smooth lobes alone: what its samples are worth.
+    sharp: f32,
     surface: Surface,
     receiver: Receiver,
     on: OnSolid,
@@ -200,7 +205,7 @@ impl TileShader<'_> {
         bounce
             .arrivals
             .extend(points.iter().map(|point| self.arrival(tile, point)));
-        self.surround(tracer, bounce, self.options.environment_samples);
+        self.surround(tracer, bounce);
         for arrival in &bounce.arrivals {
             add(out, arrival.pixel, arrival.weight * arrival.color);
         }
@@ -214,6 +219,7 @@ impl TileShader<'_> {
         Arrival {
             pixel: [point.x, point.y],
             weight: Vec3::splat(point.weight),
+            sharp: 1.0,
             surface: point.surface,
             receiver: point.receiver,
             on: point.on,
@@ -264,7 +270,7 @@ impl TileShader<'_> {
                 }
             }
             self.illuminate_arrivals(tracer, work);
-            self.surround(tracer, work, 1);
+            self.surround(tracer, work);
             for arrival in &work.arrivals {
                 add(out, arrival.pixel, arrival.weight * arrival.color);
                 self.depart(arrival, &mut work.next);
@@ -318,6 +324,7 @@ impl TileShader<'_> {
             arrivals.push(Arrival {
                 pixel: flight.pixel,
                 weight: weight * surface.alpha,
+                sharp: flight.sharp,
                 receiver,
                 on: None,
                 bounces: flight.bounces,
@@ -378,7 +385,7 @@ impl TileShader<'_> {
         let surface = &arrival.surface;
         let traced = self.traced(surface, arrival.bounces);
         if traced.reflection {
-            let rays = self.reflected_rays(surface, arrival.bounces);
+            let rays = self.reflected_rays(surface, arrival.sharp);
             let draw = |random| lobes::reflected(surface, random);
             self.send(arrival, REFLECTED, rays, arrival.absorption, draw, next);
         }
@@ -389,37 +396,41 @@ impl TileShader<'_> {
                 (false, false) => Vec3::ZERO,
             };
             let smooth = lobes::is_smooth(surface);
-            let rays = self.rays(arrival.bounces, smooth, surface.transmission);
+            let rays = self.rays(arrival.sharp, smooth, surface.transmission);
             let draw = |random| lobes::transmitted(surface, random);
             self.send(arrival, TRANSMITTED, rays, behind, draw, next);
         }
         if traced.diffusion {
-            let rays = self.diffused_rays(surface, arrival.bounces);
+            let rays = self.diffused_rays(surface, arrival.sharp);
             let draw = |random| lobes::diffused(surface, random);
             self.send(arrival, DIFFUSED, rays, arrival.absorption, draw, next);
         }
     }
 
-    /// How many rays a lobe draws that passes on about this share of its light.
-    fn rays(&self, bounces: u32, smooth: bool, share: f32) -> u32 {
-        if bounces > 0 || smooth {
+    /// How many rays a lobe draws that passes on about this share of its light, at a surface that this share of the
+    /// pixel shows sharply.
+    fn rays(&self, sharp: f32, smooth: bool, share: f32) -> u32 {
+        if smooth {
             1
         } else {
-            (self.options.samples as f32 * share.clamp(0.0, 1.0))
-                .ceil()
-                .max(1.0) as u32
+            worth(self.options.samples, sharp * share.clamp(0.0, 1.0))
         }
     }
 
     /// As [`Self::rays`], of the reflection.
-    fn reflected_rays(&self, surface: &Surface, bounces: u32) -> u32 {
+    fn reflected_rays(&self, surface: &Surface, sharp: f32) -> u32 {
         let share = brdf::reflectance(surface, surface.normal.dot(surface.view)).max_element();
-        self.rays(bounces, lobes::is_smooth(surface), share)
+        self.rays(sharp, lobes::is_smooth(surface), share)
     }
 
     /// As [`Self::rays`], of diffuse light.
-    fn diffused_rays(&self, surface: &Surface, bounces: u32) -> u32 {
-        self.rays(bounces, false, surface.base_color.max_element())
+    fn diffused_rays(&self, surface: &Surface, sharp: f32) -> u32 {
+        self.rays(sharp, false, surface.base_color.max_element())
+    }
+
+    /// How many directions to the environment a surface draws.
+    fn directions(&self, sharp: f32) -> u32 {
+        worth(self.options.environment_samples, sharp)
     }
 
     /// Sends out the rays of one lobe.
@@ -433,11 +444,11 @@ impl TileShader<'_> {
         next: &mut Vec<Flight>,
     ) {
         let surface = &arrival.surface;
-        let drawn = match (self.environment, arrival.bounces) {
-            (None, _) => 0.0,
-            (Some(_), 0) => self.options.environment_samples as f32,
-            (Some(_), _) => 1.0,
+        let drawn = match self.environment {
+            None => 0.0,
+            Some(_) => self.directions(arrival.sharp) as f32,
         };
+        let smooth = purpose != DIFFUSED && lobes::is_smooth(surface);
         for i in 0..rays {
             let k = self.sample * rays + i;
             let Some(lobe) = draw(self.draw(arrival.path, purpose, k)) else {
@@ -456,6 +467,11 @@ impl TileShader<'_> {
             next.push(Flight {
                 pixel: arrival.pixel,
                 weight: weight / rays as f32,
+                sharp: if smooth {
+                    arrival.sharp * lobe.weight.max_element().min(1.0)
+                } else {
+                    0.0
+                },
                 ray: SurfaceRay {
                     from: arrival.receiver,
                     dir: lobe.towards,
@@ -475,6 +491,11 @@ impl TileShader<'_> {
             });
         }
     }
+}
+
+/// How many of these samples a share of the pixel is worth, one at least.
+fn worth(samples: u32, share: f32) -> u32 {
+    ((samples as f32 * share).ceil() as u32).clamp(1, samples.max(1))
 }
 
 /// What a volume leaves of light after this distance (Beer and Lambert).
