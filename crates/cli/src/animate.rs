@@ -22,7 +22,7 @@ use crate::output::Targets;
 use crate::progress::Bar;
 use crate::render::{check_memory, environment, lens, options, picture};
 use crate::report::{self, count, duration, milliseconds};
-use crate::values::{Shard, Span};
+use crate::values::Span;
 use crate::view::View;
 
 /// One frame; its fields are those of the JSON object, one to a line.
@@ -241,7 +241,7 @@ fn target(args: &AnimateArgs, frame: u32) -> Result<Targets, Failure> {
         npy: None,
         layers: args.layers.clone(),
     };
-    Targets::new(&target, &args.picture, false)
+    Targets::new(&target, &args.picture.tone, false)
 }
 
 /// The file of a frame: the last run of `#` in the name stands for its number, or the end of the stem does.
@@ -306,12 +306,6 @@ fn turn(camera: &mut PosedCamera, geometry: &FrameGeometry, angle: f64) {
     camera.up = rotation * camera.up;
 }
 
-impl Shard {
-    fn has(self, frame: u32) -> bool {
-        frame % self.of == self.index - 1
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -323,13 +317,5 @@ mod tests {
         assert_eq!(name("#.exr"), "7.exr");
         assert_eq!(name("b#/walk.png"), "b#/walk-0007.png");
         assert_eq!(name("a##b#.png"), "a##b7.png");
-    }
-
-    #[test]
-    fn shards_share_all_frames() {
-        let shard = |index| Shard { index, of: 3 };
-        for frame in 0..20 {
-            assert_eq!((1..=3).filter(|&index| shard(index).has(frame)).count(), 1);
-        }
     }
 }

@@ -6,12 +6,12 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use glam::{DVec3, Vec3};
+use rayward::Shard;
 use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shard, Size,
-    Span, Up,
+    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Size, Span, Up,
 };
 
 const HELP: &str = "\
@@ -44,6 +44,7 @@ Examples:
   rayward render model.glb --light square:0,3,1:0.5 --samples 64 -o soft.png
   rayward render model.glb --layers depth,normal -o model.exr
   rayward render model.glb --npy layers --json > summary.json
+  rayward render model.glb --shard 2/4            the second of four processes that share the picture
   rayward render model.glb -o - | display";
 
 const ANIMATE_HELP: &str = "\
@@ -56,6 +57,16 @@ Examples:
   rayward animate model.glb --turn 360 --frames 0..48 -o turn.gif
   rayward animate model.glb --resume              goes on after it was stopped
   rayward animate model.glb --shard 1/4           the first of four processes that share the frames";
+
+const MERGE_HELP: &str = "\
+Parts are those that `rayward render --shard` makes: joined they are the picture that one run of it makes, bit for bit,
+with the tone map given here. A movie is an --output of .apng, .gif or, by an installed ffmpeg, .mp4, .webm or .mkv.
+
+Examples:
+  rayward render --shard 1/2                      on one machine
+  rayward render --shard 2/2                      on another
+  rayward merge rayward-*-of-2.exr -o courtyard.png
+  rayward merge walk-????.png --rate 30 -o walk.gif";
 
 /// Pictures of scenes, ray traced on the CPU: one structure for every camera and light, rebuilt every frame
 #[derive(Debug, Parser)]
@@ -71,7 +82,7 @@ pub(crate) enum Command {
     Render(Box<RenderArgs>),
     /// Render the frames of an animation, or of a turn around the scene, to numbered pictures or a movie
     Animate(Box<AnimateArgs>),
-    /// Join numbered pictures to a movie
+    /// Join the parts of a picture, or numbered pictures to a movie
     Merge(MergeArgs),
     /// Say what is in a scene, and what of it will be skipped
     Info(InfoArgs),
@@ -204,6 +215,10 @@ pub(crate) struct RenderArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) target: TargetArgs,
+    /// The I-th of N shares of the picture, I/N: an .exr file, rayward-I-of-N.exr unless --output names another, which
+    /// `rayward merge` joins with the others
+    #[arg(long, value_name = "I/N", value_parser = values::shard, conflicts_with = "npy", help_heading = "Output")]
+    pub(crate) shard: Option<Shard>,
     #[command(flatten)]
     pub(crate) run: RunArgs,
 }
@@ -242,16 +257,18 @@ pub(crate) struct AnimateArgs {
 
 /// `rayward merge`
 #[derive(Debug, Args)]
+#[command(after_help = MERGE_HELP)]
 pub(crate) struct MergeArgs {
-    /// Pictures of one size, in order
+    /// All parts of a picture, or pictures of one size in the order of the movie
     #[arg(required = true, value_name = "FILES")]
     pub(crate) pictures: Vec<PathBuf>,
-    /// The movie: .apng, .gif, and by an installed ffmpeg .mp4, .webm, .mkv
-    #[arg(short, long, value_name = "FILE")]
-    pub(crate) output: PathBuf,
-    /// Pictures a second
+    /// Pictures a second, for a movie
     #[arg(long, value_name = "NUMBER", default_value_t = 24.0, value_parser = values::positive)]
     pub(crate) rate: f64,
+    #[command(flatten)]
+    pub(crate) tone: ToneArgs,
+    #[command(flatten)]
+    pub(crate) target: TargetArgs,
     /// No progress
     #[arg(short, long)]
     pub(crate) quiet: bool,
@@ -309,12 +326,8 @@ pub(crate) struct PictureArgs {
     /// Blended surfaces colour the light they let through, as stained glass does; they dim it otherwise
     #[arg(long, conflicts_with = "no_shadows")]
     pub(crate) tinted_shadows: bool,
-    /// From linear colour to what is displayed, for PNG; `none`, or `exposure` where --exposure is given
-    #[arg(long, value_name = "OPERATOR")]
-    pub(crate) tone_map: Option<Operator>,
-    /// Photographic stops, for the tone maps exposure and aces; auto makes the picture's middle a mid grey
-    #[arg(long, value_name = "STOPS|auto", value_parser = values::exposure, allow_hyphen_values = true)]
-    pub(crate) exposure: Option<Exposure>,
+    #[command(flatten)]
+    pub(crate) tone: ToneArgs,
     /// Linear colour where nothing is seen, r,g,b, also before an environment
     #[arg(long, value_name = "COLOR", value_parser = values::color)]
     pub(crate) background: Option<Vec3>,
@@ -351,6 +364,18 @@ pub(crate) struct PictureArgs {
     /// pictures only
     #[arg(long, conflicts_with = "paper")]
     pub(crate) reference: bool,
+}
+
+/// How light becomes what is displayed.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Picture")]
+pub(crate) struct ToneArgs {
+    /// From linear colour to what is displayed, for PNG; `none`, or `exposure` where --exposure is given
+    #[arg(long, value_name = "OPERATOR")]
+    pub(crate) tone_map: Option<Operator>,
+    /// Photographic stops, for the tone maps exposure and aces; auto makes the picture's middle a mid grey
+    #[arg(long, value_name = "STOPS|auto", value_parser = values::exposure, allow_hyphen_values = true)]
+    pub(crate) exposure: Option<Exposure>,
 }
 
 /// Where the picture goes.

@@ -74,6 +74,8 @@ impl From<Error> for Failure {
             Error::Read { .. }
             | Error::MalformedImage { .. }
             | Error::UnknownImageFormat { .. }
+            | Error::MissingParts { .. }
+            | Error::MissingLayer { .. }
             | Error::Camera { .. } => Code::Input,
             Error::ImageSize { .. } | Error::ImageTooLarge { .. } => Code::Limit,
             Error::SizeMismatch { .. } => Code::Beyond,

@@ -1,32 +1,67 @@
-//! `rayward merge`: numbered pictures to a movie.
+//! `rayward merge`: the parts of a picture to the picture, numbered pictures to a movie.
 //!
-//! What shares of `rayward animate` rendered becomes the movie that one run of it makes, to the bit.
+//! What shares of `rayward render` or `rayward animate` rendered becomes what one run of it makes, to the bit.
 
-use rayward::image_io::{MovieOptions, Picture, is_movie, read_picture_up_to, write_movie};
+use std::path::Path;
+
+use rayward::image_io::{MovieOptions, Picture, is_movie, join_parts, read_picture_up_to, write_movie};
+use rayward::{Error, LayerKind};
 
 use crate::args::MergeArgs;
 use crate::failure::{Code, Failure};
 use crate::machine;
+use crate::output::Targets;
 use crate::progress::Bar;
 
 /// Memory that a picture takes while it is read and encoded, in bytes a pixel.
 const PIXEL_BYTES: u64 = 40;
 
-/// Joins all pictures.
+/// The same of a part with all layers: the joined film, the part's, and its channels as read.
+const PART_BYTES: u64 = 4 * 52;
+
+/// Joins everything.
 pub(crate) fn run(args: &MergeArgs) -> Result<(), Failure> {
-    if !is_movie(&args.output) {
-        return Err(Failure::new(
-            Code::Usage,
-            format_args!(
-                "--output {}: the ending has to be .apng, .gif, .mp4, .webm or .mkv",
-                args.output.display()
-            ),
-        ));
-    }
     let bar = Bar::of_frames(!args.quiet);
     bar.phase("joining");
     bar.frames(args.pictures.len() as u64);
-    let limit = machine::available_memory().map_or(u64::MAX, |bytes| bytes / PIXEL_BYTES);
+    match &args.target.output {
+        Some(path) if is_movie(path) => movie(args, path, &bar),
+        _ => picture(args, &bar),
+    }
+}
+
+fn limit(pixel: u64) -> u64 {
+    machine::available_memory().map_or(u64::MAX, |bytes| bytes / pixel)
+}
+
+/// Joins the parts of a picture.
+fn picture(args: &MergeArgs, bar: &Bar) -> Result<(), Failure> {
+    let targets = Targets::new(&args.target, &args.tone, false)?;
+    let mut film = join_parts(&args.pictures, limit(PART_BYTES), || bar.next_frame())?;
+    let missing = |kind: &LayerKind| targets.layers.has(*kind) && !film.holds(*kind);
+    if let Some(kind) = LayerKind::ALL.into_iter().find(missing)
+        && !args.target.layers.is_empty()
+    {
+        return Err(Error::MissingLayer { layer: kind.name() }.into());
+    }
+    film.keep(targets.layers);
+    bar.phase("writing");
+    targets.write(&film)?;
+    Ok(())
+}
+
+/// Joins pictures to a movie.
+fn movie(args: &MergeArgs, path: &Path, bar: &Bar) -> Result<(), Failure> {
+    if args.target.npy.is_some() || !args.target.layers.is_empty() {
+        return Err(Failure::new(Code::Usage, "--npy, --layers: a movie has neither"));
+    }
+    if args.tone.tone_map.is_some() || args.tone.exposure.is_some() {
+        return Err(Failure::new(
+            Code::Usage,
+            "--tone-map, --exposure: a movie is made of pictures that have theirs",
+        ));
+    }
+    let limit = limit(PIXEL_BYTES);
     let mut first = Some(read_picture_up_to(&args.pictures[0], limit)?);
     let [width, height] = first
         .as_ref()
@@ -38,7 +73,7 @@ pub(crate) fn run(args: &MergeArgs) -> Result<(), Failure> {
         rate: args.rate,
     };
     let mut paths = args.pictures.iter();
-    write_movie(&args.output, &options, |rgb| {
+    write_movie(path, &options, |rgb| {
         let Some(path) = paths.next() else { return Ok(()) };
         let picture = match first.take() {
             Some(picture) => picture,

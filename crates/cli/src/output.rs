@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use rayward::image_io::{encode_png, write_exr, write_npy, write_png};
 use rayward::tonemap::automatic_exposure;
-use rayward::{Error, Film, IntensityRange, LayerKind, Layers, ToneMap, ToneMapper};
+use rayward::{Error, Film, IntensityRange, LayerKind, Layers, Shard, ToneMap, ToneMapper};
 
-use crate::args::{PictureArgs, TargetArgs};
+use crate::args::{TargetArgs, ToneArgs};
 use crate::failure::{Code, Failure};
 use crate::report;
 use crate::values::{self, Exposure, Operator};
@@ -38,7 +38,7 @@ pub(crate) struct Targets {
 
 impl Targets {
     /// Checks what was asked for. `json` says that standard output is taken.
-    pub(crate) fn new(target: &TargetArgs, picture: &PictureArgs, json: bool) -> Result<Self, Failure> {
+    pub(crate) fn new(target: &TargetArgs, tone: &ToneArgs, json: bool) -> Result<Self, Failure> {
         let output = match (&target.output, &target.npy) {
             (Some(path), _) => Some(path.as_path()),
             (None, Some(_)) => None,
@@ -70,14 +70,37 @@ impl Targets {
         Ok(Self {
             picture: written,
             arrays: target.npy.clone(),
-            tone_map: tone_map(picture)?,
-            automatic: picture.exposure == Some(Exposure::Auto),
+            tone_map: tone_map(tone)?,
+            automatic: tone.exposure == Some(Exposure::Auto),
             layers: if layered {
                 values::layers(&target.layers)
             } else {
                 Layers::default()
             },
         })
+    }
+
+    /// As [`Targets::new`], for a part of a picture.
+    pub(crate) fn of_part(
+        target: &TargetArgs,
+        shard: Shard,
+        tone: &ToneArgs,
+        json: bool,
+    ) -> Result<Self, Failure> {
+        let named = || PathBuf::from(format!("rayward-{}-of-{}.exr", shard.index(), shard.of()));
+        let path = target.output.clone().unwrap_or_else(named);
+        if path.as_os_str() == "-" || form(&path)? != Form::Exr {
+            return Err(usage(format_args!(
+                "--output {}: with --shard it is an .exr file, of which `rayward merge` makes any other",
+                path.display()
+            )));
+        }
+        let target = TargetArgs {
+            output: Some(path),
+            npy: None,
+            layers: target.layers.clone(),
+        };
+        Self::new(&target, tone, json)
     }
 
     /// Memory for a pixel, in bytes: what the film holds of it, and what the largest of the writers holds besides.
@@ -175,7 +198,7 @@ fn check_folder(path: &Path) -> Result<(), Failure> {
     }
 }
 
-fn tone_map(args: &PictureArgs) -> Result<ToneMap, Failure> {
+fn tone_map(args: &ToneArgs) -> Result<ToneMap, Failure> {
     let stops = match args.exposure {
         Some(Exposure::Stops(stops)) => stops,
         Some(Exposure::Auto) | None => 0.0,

@@ -20,11 +20,16 @@ use crate::view::View;
 /// Renders, writes and tells what it cost.
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let start = Instant::now();
-    let targets = Targets::new(&args.target, &args.picture, args.run.json)?;
+    let tone = &args.picture.tone;
+    let targets = match args.shard {
+        Some(shard) => Targets::of_part(&args.target, shard, tone, args.run.json),
+        None => Targets::new(&args.target, tone, args.run.json),
+    }?;
     let level = machine::simd_level(args.run.simd.as_deref())?;
     machine::start_threads(args.run.threads)?;
     let options = RenderOptions {
         layers: targets.layers,
+        shard: args.shard,
         level,
         environment_samples: args.view.environment_samples,
         ..options(&args.picture)

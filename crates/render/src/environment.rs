@@ -63,6 +63,11 @@ impl Environment {
         Self::new(&read_picture(path)?.to_linear(), path)
     }
 
+    /// All that it is made of: texels, and turn, intensity, width.
+    pub(crate) fn values(&self) -> (&[Vec3], ([f32; 2], f32, usize)) {
+        (&self.texels, (self.turn, self.intensity, self.width))
+    }
+
     /// An environment of these linear texels; `path` is for messages.
     ///
     /// # Errors

@@ -75,6 +75,16 @@ pub enum Error {
         /// Height of the second image in pixels.
         b_height: u32,
     },
+    /// Not all parts of a picture are there.
+    #[error("{missing} of the {of} parts of the picture {} missing, {first}/{of} first", if *missing == 1 { "is" } else { "are" })]
+    MissingParts {
+        /// How many are not.
+        missing: u32,
+        /// How many there should be.
+        of: u32,
+        /// The first that is not there, counted from 1.
+        first: u32,
+    },
     /// A layer was asked for that the film does not hold.
     #[error("the film holds no {layer} layer")]
     MissingLayer {

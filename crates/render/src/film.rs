@@ -6,10 +6,12 @@
 //! Tiles are written in parallel through [`Film::tiles_mut`], which splits every layer into disjoint row
 //! segments: no copy, no lock. Splitting costs some 10 ns for each row of each tile and layer.
 
+use std::ops::Range;
+
 use glam::{Vec2, Vec3};
 
-use crate::Result;
 use crate::error::check_size;
+use crate::{Part, Result};
 
 /// Which layers a film holds besides its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +43,33 @@ impl Layers {
         prim: true,
         bary: true,
     };
+
+    /// Whether this layer is among them; colour always is.
+    pub fn has(self, layer: LayerKind) -> bool {
+        match layer {
+            LayerKind::Color => true,
+            LayerKind::Alpha => self.alpha,
+            LayerKind::Depth => self.depth,
+            LayerKind::Distance => self.distance,
+            LayerKind::Normal => self.normal,
+            LayerKind::Object => self.object,
+            LayerKind::Prim => self.prim,
+            LayerKind::Bary => self.bary,
+        }
+    }
+
+    /// Those that are in both.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            alpha: self.alpha && other.alpha,
+            depth: self.depth && other.depth,
+            distance: self.distance && other.distance,
+            normal: self.normal && other.normal,
+            object: self.object && other.object,
+            prim: self.prim && other.prim,
+            bary: self.bary && other.bary,
+        }
+    }
 
     /// Memory that a film with these layers takes for a pixel, colour included, in bytes.
     pub fn bytes_a_pixel(self) -> u64 {
@@ -155,6 +184,7 @@ pub struct Film {
     width: u32,
     height: u32,
     layers: Layers,
+    pub(crate) part: Option<Part>,
     /// Linear colour.
     pub color: Vec<Vec3>,
     /// See [`Layers::alpha`].
@@ -194,6 +224,7 @@ impl Film {
             width,
             height,
             layers,
+            part: None,
             color: vec![color; pixels],
             alpha: layer(layers.alpha, alpha, pixels),
             depth: layer(layers.depth, depth, pixels),
@@ -220,18 +251,52 @@ impl Film {
         self.layers
     }
 
+    /// Which part of a picture it is, if it is not all of it.
+    pub fn part(&self) -> Option<Part> {
+        self.part
+    }
+
+    /// Has the film know the layers that were put into it.
+    pub(crate) fn note_layers(&mut self) {
+        self.layers = Layers {
+            alpha: !self.alpha.is_empty(),
+            depth: !self.depth.is_empty(),
+            distance: !self.distance.is_empty(),
+            normal: !self.normal.is_empty(),
+            object: !self.object.is_empty(),
+            prim: !self.prim.is_empty(),
+            bary: !self.bary.is_empty(),
+        };
+    }
+
+    /// Leaves out all layers that are not among these.
+    pub fn keep(&mut self, layers: Layers) {
+        let film = self;
+        film.layers = film.layers.and(layers);
+        drop_unless(layers.alpha, &mut film.alpha);
+        drop_unless(layers.depth, &mut film.depth);
+        drop_unless(layers.distance, &mut film.distance);
+        drop_unless(layers.normal, &mut film.normal);
+        drop_unless(layers.object, &mut film.object);
+        drop_unless(layers.prim, &mut film.prim);
+        drop_unless(layers.bary, &mut film.bary);
+    }
+
+    /// Takes over a range of pixels from a film of the same size and layers.
+    pub(crate) fn copy_row(&mut self, other: &Self, pixels: Range<usize>) {
+        copy(&mut self.color, &other.color, &pixels);
+        copy(&mut self.alpha, &other.alpha, &pixels);
+        copy(&mut self.depth, &other.depth, &pixels);
+        copy(&mut self.distance, &other.distance, &pixels);
+        copy(&mut self.normal, &other.normal, &pixels);
+        copy(&mut self.object, &other.object, &pixels);
+        copy(&mut self.prim, &other.prim, &pixels);
+        copy(&mut self.bary, &other.bary, &pixels);
+    }
+
     /// Whether it holds this layer.
     pub fn holds(&self, layer: LayerKind) -> bool {
-        match layer {
-            LayerKind::Color => true,
-            LayerKind::Alpha => self.layers.alpha,
-            LayerKind::Depth => self.layers.depth,
-            LayerKind::Distance => self.layers.distance,
-            LayerKind::Normal => self.layers.normal,
-            LayerKind::Object => self.layers.object,
-            LayerKind::Prim => self.layers.prim,
-            LayerKind::Bary => self.layers.bary,
-        }
+        self.layers.has(layer)
     }
 
     /// Splits the film into tiles of at most `tile_width` x `tile_height` pixels, row by row from the top left;
@@ -264,6 +329,18 @@ impl Film {
         grid.split(&mut self.prim, &mut tiles, |tile| &mut tile.prim);
         grid.split(&mut self.bary, &mut tiles, |tile| &mut tile.bary);
         tiles
+    }
+}
+
+fn drop_unless<T>(wanted: bool, layer: &mut Vec<T>) {
+    if !wanted {
+        *layer = Vec::new();
+    }
+}
+
+fn copy<T: Copy>(to: &mut [T], from: &[T], pixels: &Range<usize>) {
+    if !to.is_empty() {
+        to[pixels.clone()].copy_from_slice(&from[pixels.clone()]);
     }
 }
 

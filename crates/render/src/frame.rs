@@ -16,6 +16,7 @@ use crate::plan::FramePlan;
 use crate::reference::EveryTriangle;
 use crate::secondary::{HierarchyBuilder, SecondaryBuilder, SecondaryTracer};
 use crate::solids::{self, FrameSolids};
+use crate::shard::{Ingredients, Part};
 use crate::structures::FrameStructures;
 use crate::tile::{TileCounts, TileShader, TileWork};
 use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
@@ -90,7 +91,8 @@ impl<'s> Renderer<'s> {
             let still = Shutter { geometry, camera };
             return self.render_shutter(geometry, camera, still, lights, options, progress);
         }
-        let camera = CameraFrame::new(camera, geometry.origin, options.width, options.height)?;
+        let posed = camera;
+        let camera = CameraFrame::new(posed, geometry.origin, options.width, options.height)?;
         let mut film = Film::new(options.width, options.height, options.layers)?;
         let view = camera.view(geometry);
         let start = Instant::now();
@@ -163,6 +165,7 @@ impl<'s> Renderer<'s> {
         if let Some(mean) = mean {
             mean.finish(&mut film);
         }
+        self.mark(&mut film, geometry, posed, None, lights, options);
         let mut stats = stats(geometry, options, counts);
         stats.structures = structures.stats;
         (stats.build, stats.trace) = (build, start.elapsed());
@@ -187,14 +190,47 @@ impl<'s> Renderer<'s> {
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<RenderedFrame> {
         let opening = (geometry, camera);
-        distributed::render(
+        let mut rendered = distributed::render(
             (self.scene, &self.shader),
             opening,
             shutter,
             lights,
             options,
             progress,
-        )
+        )?;
+        self.mark(
+            &mut rendered.film,
+            geometry,
+            camera,
+            Some(shutter),
+            lights,
+            options,
+        );
+        Ok(rendered)
+    }
+
+    /// Has a film know which part of which picture it is, if not all of it was asked for.
+    fn mark(
+        &self,
+        film: &mut Film,
+        geometry: &FrameGeometry,
+        camera: &PosedCamera,
+        shutter: Option<Shutter>,
+        lights: &[PosedLight],
+        options: &RenderOptions,
+    ) {
+        let Some(shard) = options.shard else { return };
+        let ingredients = Ingredients {
+            scene: self.scene,
+            geometry,
+            camera,
+            shutter,
+            lights,
+            environment: self.environment.as_ref(),
+            options,
+        };
+        let picture = ingredients.checksum();
+        film.become_part(Part { shard, picture });
     }
 
     /// Finds the components and clusters anew only where the triangles are others than in the last frame.
@@ -218,13 +254,12 @@ impl<'s> Renderer<'s> {
 
 /// What was counted.
 fn stats(geometry: &FrameGeometry, options: &RenderOptions, counts: TileCounts) -> FrameStats {
-    let pixels = u64::from(options.width) * u64::from(options.height);
     FrameStats {
         triangles: geometry.triangle_count(),
         dropped_non_finite: geometry.dropped_non_finite,
         dropped_degenerate: geometry.dropped_degenerate,
         solids: geometry.solids.len(),
-        eye_rays: pixels * u64::from(options.pixel_samples.max(1)),
+        eye_rays: options.pixels() * u64::from(options.pixel_samples.max(1)),
         shadow_rays: counts.shadow_rays,
         secondary_rays: counts.secondary_rays,
         exact_pixels: counts.exact_pixels,
@@ -240,7 +275,13 @@ fn render_tiles(shader: &TileShader, film: &mut Film, told: &(impl Fn() + Sync))
         .par_iter_mut()
         .enumerate()
         .map_init(TileWork::default, |work, (index, out)| {
-            let counts = shader.render(index as u32, work, out);
+            let index = index as u32;
+            let wanted = shader.options.renders(&shader.structures.eye.tile(index));
+            let counts = if wanted {
+                shader.render(index, work, out)
+            } else {
+                TileCounts::default()
+            };
             told();
             counts
         })

@@ -44,6 +44,7 @@ mod reference;
 mod secondary;
 pub mod shade;
 mod solids;
+mod shard;
 mod stats;
 mod structures;
 pub mod texture;
@@ -69,6 +70,7 @@ pub use secondary::{
 };
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
 pub use solids::solids;
+pub use shard::{Part, Shard};
 pub use stats::{FrameStats, StructureStats};
 pub use structures::{FrameStructures, LightShadows};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};

@@ -1,9 +1,9 @@
 //! What is asked of a frame, as plain data.
 
 use glam::Vec3;
-use rayward_trace::SimdLevel;
+use rayward_trace::{SimdLevel, Tile};
 
-use crate::{Layers, Lens, PixelFilter};
+use crate::{Layers, Lens, PixelFilter, Shard};
 
 /// Parameters of a frame. `..RenderOptions::default()` gives a full HD picture with shadows.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +43,8 @@ pub struct RenderOptions {
     pub seed: u32,
     /// Layers to keep besides the colour.
     pub layers: Layers,
+    /// The share of the picture that is rendered; all of it unless given. Pixels of other shares see nothing.
+    pub shard: Option<Shard>,
     /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
     /// back faces alone as casters, lights with a size shaded from their middle times the share of samples seen.
     pub paper: bool,
@@ -72,6 +74,7 @@ impl Default for RenderOptions {
             samples: 8,
             seed: 0,
             layers: Layers::default(),
+            shard: None,
             paper: false,
             reference: false,
             level: SimdLevel::detect(),
@@ -93,6 +96,20 @@ pub enum CasterPolicy {
 }
 
 impl RenderOptions {
+    /// Whether any pixel of a tile is to be rendered.
+    pub(crate) fn renders(&self, tile: &Tile) -> bool {
+        let size = [tile.width, tile.height];
+        self.shard
+            .is_none_or(|shard| shard.has_any([tile.x, tile.y], size))
+    }
+
+    /// How many pixels are rendered.
+    pub(crate) fn pixels(&self) -> u64 {
+        let (width, height) = (self.width, self.height);
+        let all = u64::from(width) * u64::from(height);
+        self.shard.map_or(all, |shard| shard.pixels(width, height))
+    }
+
     /// The policy in force: the papers' parameters bring their own.
     pub(crate) fn casters(&self) -> CasterPolicy {
         if self.paper {

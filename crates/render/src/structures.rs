@@ -87,7 +87,7 @@ impl<'g> FrameStructures<'g> {
         let slowly = rules.any_transparent() || options.paper || options.reference;
         let at_once = plan.lights.iter().any(hard) && !slowly;
         let visibility = at_once.then(|| {
-            let trace = || Visibility::trace(&eye, &|| ());
+            let trace = || look_around(&eye, options);
             stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
         });
 
@@ -196,7 +196,7 @@ impl<'g> FrameStructures<'g> {
         if self.visibility.is_none() {
             return;
         }
-        self.visibility = Some(Visibility::trace(&self.eye, &|| ()));
+        self.visibility = Some(look_around(&self.eye, options));
         let mut scratch = LitScratch::default();
         for (plan, shadows) in plan.lights.iter().zip(&mut self.lights) {
             if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
@@ -267,6 +267,11 @@ fn eye_grid<'g>(
     }
     let opaque = |prim| !rules.is_transparent(prim);
     EyeGrid::build_of(view, triangles, opaque, plan.eye, level)
+}
+
+/// Traces the tiles that are to be rendered.
+fn look_around(eye: &EyeGrid, options: &RenderOptions) -> Visibility {
+    Visibility::trace_some(eye, &|tile| options.renders(tile), &|_, _| ())
 }
 
 /// Builds the structure for all other rays.

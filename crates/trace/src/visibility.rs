@@ -34,15 +34,27 @@ impl Visibility {
     /// Traces all tiles of a grid, on all threads of the current rayon pool; `done` is told after each, from any
     /// thread.
     pub fn trace(grid: &EyeGrid, done: &(dyn Fn() + Sync)) -> Self {
-        Self::trace_and(grid, &|_, _| done())
+        Self::trace_some(grid, &|_| true, &|_, _| done())
     }
 
     /// As [`Self::trace`], giving each tile and its hits to `use_it`, from any thread.
     pub fn trace_and(grid: &EyeGrid, use_it: &(dyn Fn(&Tile, &TileHits) + Sync)) -> Self {
+        Self::trace_some(grid, &|_| true, use_it)
+    }
+
+    /// As [`Self::trace_and`] for the tiles that are wanted; the pixels of others see nothing.
+    pub fn trace_some(
+        grid: &EyeGrid,
+        wanted: &(dyn Fn(&Tile) -> bool + Sync),
+        use_it: &(dyn Fn(&Tile, &TileHits) + Sync),
+    ) -> Self {
         let traced: Vec<(VisibleTile, u64, u64)> = (0..grid.tile_count())
             .into_par_iter()
             .map_init(TileHits::default, |hits, index| {
                 let tile = grid.tile(index);
+                if !wanted(&tile) {
+                    return (VisibleTile::blind(tile), 0, 0);
+                }
                 grid.trace_tile(&tile, hits);
                 use_it(&tile, hits);
                 let tile = VisibleTile::of(tile, hits);
@@ -103,6 +115,16 @@ pub(crate) fn place(stride: u32, x: u32, y: u32) -> (usize, usize) {
 }
 
 impl VisibleTile {
+    /// A tile whose pixels see nothing.
+    fn blind(tile: Tile) -> Self {
+        let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
+        Self {
+            tile,
+            stride,
+            prims: vec![[NONE; LANES]; (stride * rows) as usize],
+        }
+    }
+
     fn of(tile: Tile, hits: &TileHits) -> Self {
         let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
         let mut prims = Vec::with_capacity((stride * rows) as usize);

@@ -124,9 +124,9 @@ fn what_is_no_movie_is_said() {
     animate(&folder, &["-o", "b#.png", "--rate", "2"]).expect(0);
     let merge = ["merge", "-q", "a.png", "b0.png", "-o"];
     folder
-        .run(&[&merge[..], &["a.png"]].concat())
+        .run(&[&merge[..], &["a.avi"]].concat())
         .expect(2)
-        .says(&["a.png", ".gif"]);
+        .says(&["a.avi", "movie"]);
     folder
         .run(&[&merge[..], &["a.gif"]].concat())
         .expect(3)

@@ -7,6 +7,7 @@ mod commands;
 mod environment;
 mod gpu;
 mod render;
+mod shards;
 #[cfg(target_os = "linux")]
 mod signals;
 mod support;

@@ -365,6 +365,7 @@ impl TileShader<'_> {
         arrivals.push(Arrival {
             pixel: flight.pixel,
             weight: flight.weight * absorbed(inside, distance),
+            sharp: flight.sharp,
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,

@@ -105,9 +105,7 @@ pub(crate) fn render(
         dropped_non_finite: geometry.dropped_non_finite,
         dropped_degenerate: geometry.dropped_degenerate,
         solids: geometry.solids.len(),
-        eye_rays: u64::from(options.width)
-            * u64::from(options.height)
-            * u64::from(options.pixel_samples.max(1)),
+        eye_rays: options.pixels() * u64::from(options.pixel_samples.max(1)),
         ..FrameStats::default()
     };
     let closing = closing(geometry, close.geometry);
@@ -278,6 +276,9 @@ impl Frame<'_> {
         for y in 0..tile.height {
             for x in 0..tile.width {
                 let (px, py) = (tile.x + x, tile.y + y);
+                if self.options.shard.is_some_and(|shard| !shard.has_pixel(px, py)) {
+                    continue;
+                }
                 let mut pixel = if self.options.layers == Layers::default() {
                     Sample::background(Vec3::ZERO)
                 } else {

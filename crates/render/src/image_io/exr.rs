@@ -8,19 +8,27 @@
 //! | normal | `N.X N.Y N.Z` | f32 |
 //! | object, prim | `id.object`, `id.prim` | u32 |
 //! | bary | `bary.u bary.v` | f32 |
+//!
+//! A part of a picture has two texts besides: `raywardShard`, like `2/4`, and `raywardPicture`, the checksum of the picture
+//! in hexadecimal digits.
 
 use std::io::{self, Cursor, Seek, Write};
 use std::path::Path;
 
-use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+use exr::image::{AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, Layer};
 use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{ReadChannels, ReadLayers, WritableImage, read};
-use glam::Vec4;
+use glam::{Vec2, Vec3, Vec4};
 
 use super::file;
 use super::picture::{Picture, SizeCheck};
-use crate::{Error, Film, Result};
+use crate::{Error, Film, Layers, Part, Result};
+
+/// Names of the texts that a part of a picture has.
+const SHARD: &str = "raywardShard";
+const PICTURE: &str = "raywardPicture";
 
 /// Writes all layers of a film.
 ///
@@ -59,12 +67,21 @@ fn encode(sink: impl Write + Seek, film: &Film) -> io::Result<()> {
         floats("bary.v", &film.bary, |b| b.y),
     ];
     channels.retain(|channel| channel.sample_data.len() > 0);
+    let mut attributes = LayerAttributes {
+        software_name: Some("rayward".into()),
+        ..LayerAttributes::default()
+    };
+    if let Some(part) = film.part() {
+        let mut put = |name: &str, text: String| {
+            let text = AttributeValue::Text(Text::from(text.as_str()));
+            attributes.other.insert(Text::from(name), text);
+        };
+        put(SHARD, part.shard.to_string());
+        put(PICTURE, format!("{:016x}", part.picture));
+    }
     let layer = Layer::new(
         (film.width() as usize, film.height() as usize),
-        LayerAttributes {
-            software_name: Some("rayward".into()),
-            ..LayerAttributes::default()
-        },
+        attributes,
         Encoding::SMALL_LOSSLESS,
         AnyChannels::sort(channels.into()),
     );
@@ -78,10 +95,9 @@ fn to_io(error: exr::error::Error) -> io::Error {
     }
 }
 
-/// The colour of the first part that has any.
-pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
-    let path = check.path;
-    let malformed = |error: exr::error::Error| Error::malformed(path, format_args!("OpenEXR: {error}"));
+/// The layers of a file, once their sizes are known to be usable.
+fn layers(check: SizeCheck, bytes: &[u8]) -> Result<FlatImage> {
+    let malformed = |error: exr::error::Error| Error::malformed(check.path, format_args!("OpenEXR: {error}"));
     for header in MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(malformed)?
         .headers
@@ -90,14 +106,85 @@ pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
         let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
         check.pixels(side(size.x()), side(size.y()))?;
     }
-    let image = read()
+    read()
         .no_deep_data()
         .largest_resolution_level()
         .all_channels()
         .all_layers()
         .all_attributes()
         .from_buffered(Cursor::new(bytes))
-        .map_err(malformed)?;
+        .map_err(malformed)
+}
+
+/// Whether these bytes start like an OpenEXR file.
+pub(super) fn is_exr(bytes: &[u8]) -> bool {
+    bytes.starts_with(b"\x76\x2f\x31\x01")
+}
+
+/// A part of a picture, as it was written.
+pub(super) fn decode_part(check: SizeCheck, bytes: &[u8]) -> Result<(Film, Part)> {
+    let fail = |problem: &str| Error::malformed(check.path, problem);
+    let strange = || fail("it is no part of a picture, as `rayward render --shard` makes them");
+    if !is_exr(bytes) {
+        return Err(strange());
+    }
+    let image = layers(check, bytes)?;
+    let [layer] = image.layer_data.as_slice() else {
+        return Err(strange());
+    };
+    let text = |name: &str| match layer.attributes.other.get(&Text::from(name))? {
+        AttributeValue::Text(text) => Some(text.to_string()),
+        _ => None,
+    };
+    let part = text(SHARD).zip(text(PICTURE)).and_then(|(shard, picture)| {
+        Some(Part {
+            shard: shard.parse().ok()?,
+            picture: u64::from_str_radix(&picture, 16).ok()?,
+        })
+    });
+    let part = part.ok_or_else(strange)?;
+    let pixels = layer.size.area();
+    let (mut floats, mut ids) = (Vec::new(), Vec::new());
+    for channel in &layer.channel_data.list {
+        match &channel.sample_data {
+            FlatSamples::F32(values) if values.len() == pixels => floats.push((&channel.name, values)),
+            FlatSamples::U32(values) if values.len() == pixels => ids.push((&channel.name, values)),
+            _ => {}
+        }
+    }
+    let float = |name: &str| Some(floats.iter().find(|(own, _)| own.eq(name))?.1);
+    let pair = |u: &str, v: &str| Some((float(u)?, float(v)?));
+    let triple = |x: &str, y: &str, z: &str| Some((float(x)?, float(y)?, float(z)?));
+    let id = |name: &str| Some(ids.iter().find(|(own, _)| own.eq(name))?.1.clone());
+    let vectors = |(x, y, z): (&Vec<f32>, &Vec<f32>, &Vec<f32>)| -> Vec<Vec3> {
+        (0..pixels).map(|i| Vec3::new(x[i], y[i], z[i])).collect()
+    };
+    let points = |(u, v): (&Vec<f32>, &Vec<f32>)| -> Vec<Vec2> {
+        (0..pixels).map(|i| Vec2::new(u[i], v[i])).collect()
+    };
+
+    // Layers are put in one by one, so none is made before.
+    let size = [layer.size.x(), layer.size.y()].map(|side| side as u32);
+    let mut film = Film::new(size[0], size[1], Layers::default())?;
+    film.color = triple("R", "G", "B")
+        .map(vectors)
+        .ok_or_else(|| fail("OpenEXR: no channels R, G and B of single precision"))?;
+    film.alpha = float("A").cloned().unwrap_or_default();
+    film.depth = float("depth.Z").cloned().unwrap_or_default();
+    film.distance = float("distance.D").cloned().unwrap_or_default();
+    film.normal = triple("N.X", "N.Y", "N.Z").map(vectors).unwrap_or_default();
+    film.object = id("id.object").unwrap_or_default();
+    film.prim = id("id.prim").unwrap_or_default();
+    film.bary = pair("bary.u", "bary.v").map(points).unwrap_or_default();
+    film.note_layers();
+    film.part = Some(part);
+    Ok((film, part))
+}
+
+/// The colour of the first part that has any.
+pub(super) fn decode(check: SizeCheck, bytes: &[u8]) -> Result<Picture> {
+    let path = check.path;
+    let image = layers(check, bytes)?;
     for layer in &image.layer_data {
         let channel = |name: &str| layer.channel_data.list.iter().find(|c| c.name.eq(name));
         let grey = channel("Y");

@@ -6,7 +6,7 @@
 //! | MP4, `WebM`, MKV | movies, by an installed `ffmpeg` | | sRGB encoded |
 //! | PNG | 8 bit RGB, tagged sRGB | 8 and 16 bit, all colour types | sRGB encoded |
 //! | JPEG | | 8 bit | sRGB encoded |
-//! | EXR | all layers of a film, f32 and u32, ZIP | R, G, B, A or Y of the first part that has them | linear |
+//! | EXR | all layers of a film, f32 and u32, ZIP; parts of a picture | those parts; R, G, B, A or Y of the first part that has them | linear |
 //! | NPY | one layer of a film | `(h, w)`, `(h, w, 1..=4)`; bool, integers, floats | linear; `u1` sRGB encoded |
 //! | HDR | | RGBE | linear |
 //! | PFM | | both endians | linear |
@@ -19,6 +19,7 @@ mod exr;
 mod file;
 mod movie;
 mod npy;
+mod parts;
 mod pfm;
 mod picture;
 mod png;
@@ -27,5 +28,6 @@ pub use exr::{encode_exr, write_exr};
 pub use file::{Discarded, discard_unfinished, write_bytes};
 pub use movie::{MovieOptions, is_movie, write_movie};
 pub use npy::{encode_npy, write_npy};
+pub use parts::join_parts;
 pub use picture::{Picture, read_picture, read_picture_up_to};
 pub use png::{encode_png, write_png};

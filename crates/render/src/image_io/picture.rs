@@ -91,15 +91,12 @@ pub fn read_picture(path: &Path) -> Result<Picture> {
 /// As [`read_picture`].
 pub fn read_picture_up_to(path: &Path, limit: u64) -> Result<Picture> {
     let bytes = file::read(path)?;
-    let check = SizeCheck {
-        path,
-        limit: limit.min(MAX_PIXELS),
-    };
-    match bytes.get(..4) {
-        Some(b"\x76\x2f\x31\x01") => exr::decode(check, &bytes),
-        _ if npy::is_npy(&bytes) => npy::decode(check, &bytes),
-        _ if pfm::is_pfm(&bytes) => pfm::decode(check, &bytes),
-        _ => decode(check, &bytes),
+    let check = SizeCheck::new(path, limit);
+    match () {
+        () if exr::is_exr(&bytes) => exr::decode(check, &bytes),
+        () if npy::is_npy(&bytes) => npy::decode(check, &bytes),
+        () if pfm::is_pfm(&bytes) => pfm::decode(check, &bytes),
+        () => decode(check, &bytes),
     }
 }
 
@@ -110,7 +107,12 @@ pub(super) struct SizeCheck<'a> {
     limit: u64,
 }
 
-impl SizeCheck<'_> {
+impl<'a> SizeCheck<'a> {
+    pub(super) fn new(path: &'a Path, limit: u64) -> Self {
+        let limit = limit.min(MAX_PIXELS);
+        Self { path, limit }
+    }
+
     /// The number of pixels.
     pub(super) fn pixels(self, width: u32, height: u32) -> Result<usize> {
         let pixels = u64::from(width) * u64::from(height);
