@@ -357,3 +357,72 @@ fn a_volume_absorbs_by_the_way_through_it() {
         film.color[4]
     );
 }
+
+/// A wall under a sky, of which a clear pane covers the right half.
+#[test]
+fn what_is_behind_clear_glass_is_no_noisier() {
+    let mut scene = builtin::build("teapot-mirror").expect("it exists");
+    let pane = Material {
+        transmission: 1.0,
+        roughness: 0.0,
+        ior: 1.0,
+        ..Material::default()
+    };
+    let wall = Material {
+        roughness: 1.0,
+        ..Material::default()
+    };
+    scene.materials[1..3].clone_from_slice(&[wall, pane]);
+    let mut geometry = scene.at(0.0);
+    let square = |left: f32, z: f32| {
+        [
+            [left, -90.0, z],
+            [90.0, -90.0, z],
+            [90.0, 90.0, z],
+            [left, 90.0, z],
+        ]
+    };
+    let corners = [square(-90.0, -10.0), square(0.0, -5.0)].concat();
+    [geometry.x, geometry.y, geometry.z] =
+        [0, 1, 2].map(|axis| corners.iter().map(|corner| corner[axis]).collect());
+    geometry.attributes = Default::default();
+    geometry.origin = DVec3::ZERO;
+    geometry.indices = vec![[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]];
+    geometry.objects.truncate(2);
+    for (object, first) in geometry.objects.iter_mut().zip([0, 1]) {
+        object.triangles = first * 2..first * 2 + 2;
+        object.vertices = first * 4..first * 4 + 4;
+        object.material = first + 1;
+    }
+    let camera = PosedCamera {
+        eye: DVec3::ZERO,
+        forward: DVec3::NEG_Z,
+        up: DVec3::Y,
+        ..geometry.cameras[0].clone()
+    };
+    let options = RenderOptions {
+        width: 32,
+        height: 32,
+        environment_samples: 16,
+        ..RenderOptions::default()
+    };
+    let mut renderer = Renderer::new(&scene);
+    renderer.set_environment(Some(sky(bright_corner)));
+    let rendered = renderer.render(&geometry, &camera, &[], &options, &|_| ());
+    let film = rendered.expect("valid").film;
+    let [direct, behind] = [0, 16].map(|first| {
+        let side = |pixel: &usize| pixel % 32 / 16 == first / 16;
+        let seen: Vec<f32> = (0..32 * 32)
+            .filter(side)
+            .map(|pixel| film.color[pixel].y)
+            .collect();
+        let mean = seen.iter().sum::<f32>() / seen.len() as f32;
+        let variance = seen.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / seen.len() as f32;
+        (mean, variance)
+    });
+    assert!((direct.0 / behind.0 - 1.0).abs() < 0.03, "{direct:?} {behind:?}");
+    assert!(
+        direct.1 > 0.0 && behind.1 < 2.0 * direct.1,
+        "{direct:?} {behind:?}"
+    );
+}
