@@ -75,6 +75,79 @@ fn a_signal_while_writing_does_not_wait_for_the_file() {
     }
 }
 
+/// Killed without a chance to clean up: what is in place is whole, and a resumed run makes the rest.
+#[test]
+fn frames_survive_a_kill() {
+    let (whole, killed) = (Folder::new(), Folder::new());
+    let frames = [
+        "animate",
+        "--builtin",
+        "walker",
+        "--resolution",
+        "96x64",
+        "-q",
+        "--frames",
+        "0..12",
+    ];
+    whole.run(&frames).expect(0);
+    let names = whole.names();
+    assert_eq!(names.len(), 12);
+    let resumed = [&frames[..], &["--resume"]].concat();
+    let in_place = || {
+        killed
+            .names()
+            .into_iter()
+            .filter(|name| !name.starts_with('.'))
+            .collect::<Vec<_>>()
+    };
+    for frames in [1, 4, 7] {
+        let mut child = killed.command(&resumed).spawn().expect("the program runs");
+        wait_until("some frames", || in_place().len() >= frames);
+        // At no moment in particular.
+        std::thread::sleep(Duration::from_millis(frames as u64));
+        child.kill().expect("it runs");
+        child.wait().expect("it has ended");
+        for name in in_place() {
+            let [now, then] =
+                [&killed, &whole].map(|folder| std::fs::read(folder.path(&name)).expect("a frame"));
+            assert!(now == then, "{name}");
+        }
+    }
+    killed.run(&resumed).expect(0);
+    assert_eq!(in_place(), names);
+    for name in names {
+        let [now, then] = [&killed, &whole].map(|folder| std::fs::read(folder.path(&name)).expect("a frame"));
+        assert!(now == then, "{name}");
+    }
+}
+
+#[test]
+fn memory_does_not_grow_from_frame_to_frame() {
+    let folder = Folder::new();
+    let frames = [
+        "animate",
+        "--builtin",
+        "walker",
+        "--resolution",
+        "64x48",
+        "-q",
+        "--frames",
+        "0..60",
+    ];
+    let run = folder
+        .run(&[&frames[..], &["--json", "--threads", "2"]].concat())
+        .expect(0);
+    let peaks: Vec<u64> = std::str::from_utf8(&run.stdout)
+        .expect("text")
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).expect("an object a line"))
+        .map(|frame| frame["peak_memory_bytes"].as_u64().expect("a number"))
+        .collect();
+    // What the first frames leave behind is reused by the rest.
+    let (early, last) = (peaks[20], peaks[59]);
+    assert!(last < early + (1 << 20), "{early} bytes, then {last}");
+}
+
 #[test]
 fn a_signal_that_the_caller_ignores_stays_ignored() {
     let folder = Folder::new();
