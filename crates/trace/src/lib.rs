@@ -77,7 +77,8 @@ pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
 pub use ldc::{Ldc, LdcOptions};
 pub use light_grid::{
-    CastRule, Casts, Cone, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts, ShadowScratch,
+    CastRule, Casts, Cone, LightCell, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts,
+    ShadowScratch,
 };
 pub use moving::{MovingAt, MovingGrids, MovingTriangles, Vertices};
 pub use perspective_grids::PerspectiveGrids;

@@ -115,6 +115,15 @@ pub struct ShadowCounts {
     pub exact_pairs: u64,
 }
 
+/// What a cell has for a receiver in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LightCell {
+    /// Casters that it lists.
+    pub casters: usize,
+    /// Whether the receiver lies before all of them by the cell's bound, and is lit without a test.
+    pub spared: bool,
+}
+
 /// Working memory of one thread for shadow queries.
 #[derive(Clone, Debug, Default)]
 pub struct ShadowScratch {
@@ -205,6 +214,17 @@ impl<'a> PointLightGrid<'a> {
             }
         }
         scratch.pending = pending;
+    }
+
+    /// What the cell that a receiver lies in holds; `None` if no caster can be before the receiver.
+    pub fn cell_of(&self, receiver: &Receiver) -> Option<LightCell> {
+        let (face, raster) = self.locate(receiver.point)?;
+        let face = &self.faces[face];
+        let cell = face.cell(raster[0], raster[1]);
+        Some(LightCell {
+            casters: face.bins.cell(cell).map(<[u32]>::len).sum(),
+            spared: raster[2] >= face.nearest[cell],
+        })
     }
 
     /// Leaves in `scratch.pending` the receivers that their cell does not decide, ordered by cell.

@@ -48,6 +48,12 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: Ca
                 );
             }
             counts = scratch.counts;
+            let spared = |receiver: &&Receiver| grid.cell_of(receiver).is_some_and(|cell| cell.spared);
+            assert_eq!(receivers.iter().filter(spared).count() as u64, counts.lit_by_cell);
+            for (receiver, _) in receivers.iter().zip(&shadow).filter(|(_, shadow)| **shadow) {
+                let cell = grid.cell_of(receiver);
+                assert!(cell.is_none_or(|cell| cell.casters > 0 && !cell.spared));
+            }
         }
     }
     counts
