@@ -20,7 +20,7 @@ use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
 use crate::progress::Bar;
-use crate::render::{check_memory, environment, lens, options, picture};
+use crate::render::{check_costs, check_memory, environment, lens, options, picture};
 use crate::report::{self, count, duration, milliseconds};
 use crate::values::Span;
 use crate::view::View;
@@ -75,6 +75,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         ..options(&args.picture)
     };
     check_memory(&options, first.bytes_a_pixel())?;
+    check_costs(&options, &args.picture, &args.run)?;
     machine::start_threads(args.run.threads)?;
     let bar = Bar::of_frames(!args.run.quiet);
     bar.phase("reading");
@@ -106,7 +107,9 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         job.movie(&wanted, &first, &bar)?;
     } else {
         for &frame in &wanted {
-            job.frame(frame, &bar, |rendered| target(args, frame)?.write(&rendered.film))?;
+            job.frame(frame, &bar, |rendered| {
+                target(args, frame)?.write(&mut rendered.film)
+            })?;
         }
     }
     drop(bar);
@@ -128,29 +131,35 @@ impl Job<'_> {
         &mut self,
         frame: u32,
         bar: &Bar,
-        write: impl FnOnce(&RenderedFrame) -> Result<Vec<PathBuf>, Failure>,
+        write: impl FnOnce(&mut RenderedFrame) -> Result<Vec<PathBuf>, Failure>,
     ) -> Result<(), Failure> {
         let args = self.args;
         let pose = Instant::now();
         let mut geometry = std::mem::take(&mut self.geometry);
         let view = self.pose(f64::from(frame), &mut geometry)?;
-        let close = |seconds: f64| {
-            let mut close = FrameGeometry::default();
-            let frame = f64::from(frame) + seconds * args.frames.rate;
-            let camera = self.pose(frame, &mut close)?.camera;
-            Ok::<_, Failure>((close, camera))
+        let other = |frames: f64| {
+            let mut other = FrameGeometry::default();
+            let camera = self.pose(f64::from(frame) + frames, &mut other)?.camera;
+            Ok::<_, Failure>((other, camera))
         };
-        let closed = args.picture.shutter.map(close).transpose()?;
+        let shutter = args.picture.shutter;
+        let closed = shutter
+            .map(|seconds| other(seconds * args.frames.rate))
+            .transpose()?;
+        // Nothing is before the first moment.
+        let moves = self.options.layers.motion && frame > 0;
+        let before = moves.then(|| other(-1.0)).transpose()?;
         let pose_ms = milliseconds(pose.elapsed());
         let options = RenderOptions {
             lens: lens(&args.picture, &view.camera, &geometry),
             ..self.options
         };
         let seen = (&geometry, &view);
-        let rendered = picture(&mut self.renderer, seen, closed.as_ref(), &options, &|_| ())?;
+        let others = (closed.as_ref(), before.as_ref());
+        let mut rendered = picture(&mut self.renderer, seen, others, &options, &|_| ())?;
         self.geometry = geometry;
         let writing = Instant::now();
-        let files = write(&rendered)?;
+        let files = write(&mut rendered)?;
         bar.next_frame();
         if args.run.json {
             let write_ms = milliseconds(writing.elapsed());
@@ -180,16 +189,17 @@ impl Job<'_> {
     /// Renders all frames into one file.
     fn movie(&mut self, frames: &[u32], target: &Targets, bar: &Bar) -> Result<(), Failure> {
         let path = &self.args.output;
+        let [width, height] = target.encoded_size(self.options.width, self.options.height);
         let movie = MovieOptions {
-            width: self.options.width,
-            height: self.options.height,
+            width,
+            height,
             frames: frames.len() as u32,
             rate: self.args.frames.rate,
         };
         let mut next = frames.iter();
         write_movie(path, &movie, |rgb| match next.next() {
             Some(&frame) => self.frame(frame, bar, |rendered| {
-                *rgb = target.encode(&rendered.film);
+                *rgb = target.encode(&rendered.film)?.rgb;
                 Ok(vec![path.clone()])
             }),
             None => Ok(()),

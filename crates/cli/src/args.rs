@@ -11,7 +11,8 @@ use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Size, Span, Up,
+    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shown, Size,
+    Span, Up,
 };
 
 const HELP: &str = "\
@@ -43,6 +44,8 @@ Examples:
   rayward render model.glb --environment sky.hdr --exposure auto -o model.png
   rayward render model.glb --light square:0,3,1:0.5 --samples 64 -o soft.png
   rayward render model.glb --layers depth,normal -o model.exr
+  rayward render model.glb --layers motion,cost -o costs.exr
+  rayward render model.glb --show nodes -o nodes.png
   rayward render model.glb --npy layers --json > summary.json
   rayward render model.glb --shard 2/4            the second of four processes that share the picture
   rayward render model.glb -o - | display";
@@ -215,6 +218,10 @@ pub(crate) struct RenderArgs {
     pub(crate) picture: PictureArgs,
     #[command(flatten)]
     pub(crate) target: TargetArgs,
+    /// How long before the moment of --time motion starts, for the layer motion and --show motion
+    #[arg(long, value_name = "SECONDS", value_parser = values::positive, default_value_t = 1.0 / 24.0,
+        help_heading = "Output")]
+    pub(crate) motion_time: f64,
     /// The I-th of N shares of the picture, I/N: an .exr file, rayward-I-of-N.exr unless --output names another, which
     /// `rayward merge` joins with the others
     #[arg(long, value_name = "I/N", value_parser = values::shard, conflicts_with = "npy", help_heading = "Output")]
@@ -248,7 +255,7 @@ pub(crate) struct AnimateArgs {
         help_heading = "Output"
     )]
     pub(crate) output: PathBuf,
-    /// Layers for .exr besides the colour; all unless given
+    /// Layers for .exr besides the colour; all but motion and cost unless given. Motion is that since the frame before
     #[arg(long, value_name = "LAYERS", value_delimiter = ',', help_heading = "Output")]
     pub(crate) layers: Vec<LayerName>,
     #[command(flatten)]
@@ -376,6 +383,9 @@ pub(crate) struct ToneArgs {
     /// Photographic stops, for the tone maps exposure and aces; auto makes the picture's middle a mid grey
     #[arg(long, value_name = "STOPS|auto", value_parser = values::exposure, allow_hyphen_values = true)]
     pub(crate) exposure: Option<Exposure>,
+    /// PNG and movies show this in false colours, with a legend, instead of the picture
+    #[arg(long, value_name = "MEASURE", conflicts_with_all = ["tone_map", "exposure"])]
+    pub(crate) show: Option<Shown>,
 }
 
 /// Where the picture goes.
@@ -389,7 +399,7 @@ pub(crate) struct TargetArgs {
     /// Folder for one NumPy array a layer: color.npy, depth.npy and so on
     #[arg(long, value_name = "FOLDER")]
     pub(crate) npy: Option<PathBuf>,
-    /// Layers for .exr and --npy besides the colour; all unless given
+    /// Layers for .exr and --npy besides the colour; all but motion and cost unless given
     #[arg(long, value_name = "LAYERS", value_delimiter = ',')]
     pub(crate) layers: Vec<LayerName>,
 }

@@ -38,15 +38,12 @@ fn limit(pixel: u64) -> u64 {
 fn picture(args: &MergeArgs, bar: &Bar) -> Result<(), Failure> {
     let targets = Targets::new(&args.target, &args.tone, false)?;
     let mut film = join_parts(&args.pictures, limit(PART_BYTES), || bar.next_frame())?;
-    let missing = |kind: &LayerKind| targets.layers.has(*kind) && !film.holds(*kind);
-    if let Some(kind) = LayerKind::ALL.into_iter().find(missing)
-        && !args.target.layers.is_empty()
-    {
+    let missing = |kind: &LayerKind| targets.asked.has(*kind) && !film.holds(*kind);
+    if let Some(kind) = LayerKind::ALL.into_iter().find(missing) {
         return Err(Error::MissingLayer { layer: kind.name() }.into());
     }
-    film.keep(targets.layers);
     bar.phase("writing");
-    targets.write(&film)?;
+    targets.write(&mut film)?;
     Ok(())
 }
 
@@ -55,10 +52,10 @@ fn movie(args: &MergeArgs, path: &Path, bar: &Bar) -> Result<(), Failure> {
     if args.target.npy.is_some() || !args.target.layers.is_empty() {
         return Err(Failure::new(Code::Usage, "--npy, --layers: a movie has neither"));
     }
-    if args.tone.tone_map.is_some() || args.tone.exposure.is_some() {
+    if args.tone.tone_map.is_some() || args.tone.exposure.is_some() || args.tone.show.is_some() {
         return Err(Failure::new(
             Code::Usage,
-            "--tone-map, --exposure: a movie is made of pictures that have theirs",
+            "--tone-map, --exposure, --show: a movie is made of pictures as they are",
         ));
     }
     let limit = limit(PIXEL_BYTES);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use rayward::image_io::{encode_png, write_exr, write_npy, write_png};
 use rayward::tonemap::automatic_exposure;
-use rayward::{Error, Film, IntensityRange, LayerKind, Layers, Shard, ToneMap, ToneMapper};
+use rayward::{Error, Film, HeatMap, IntensityRange, LayerKind, Layers, Measure, Shard, ToneMap, ToneMapper};
 
 use crate::args::{TargetArgs, ToneArgs};
 use crate::failure::{Code, Failure};
@@ -32,7 +32,13 @@ pub(crate) struct Targets {
     tone_map: ToneMap,
     /// Whether the picture decides on the exposure.
     automatic: bool,
-    /// Layers that have to be rendered besides the colour.
+    /// What pictures of eight bits show instead of the colour.
+    show: Option<Measure>,
+    /// Layers that were asked for by name, or to be shown.
+    pub(crate) asked: Layers,
+    /// Layers that are written besides the colour.
+    written: Layers,
+    /// Layers that have to be rendered.
     pub(crate) layers: Layers,
 }
 
@@ -67,16 +73,30 @@ impl Targets {
         if !layered && !target.layers.is_empty() {
             return Err(usage("--layers: only .exr files and --npy have layers"));
         }
+        let show: Option<Measure> = tone.show.map(Measure::from);
+        let shows = written.as_ref().is_some_and(|(_, form)| *form == Form::Png);
+        if show.is_some() && !shows {
+            return Err(usage("--show: only .png files and movies are in false colours"));
+        }
+        let layers = if layered {
+            values::layers(&target.layers)
+        } else {
+            Layers::default()
+        };
+        let shown = show.map_or(Layers::default(), Measure::layers);
         Ok(Self {
             picture: written,
             arrays: target.npy.clone(),
             tone_map: tone_map(tone)?,
             automatic: tone.exposure == Some(Exposure::Auto),
-            layers: if layered {
-                values::layers(&target.layers)
+            show,
+            asked: if target.layers.is_empty() {
+                shown
             } else {
-                Layers::default()
+                layers.or(shown)
             },
+            written: layers,
+            layers: with_sources(layers.or(shown)),
         })
     }
 
@@ -116,18 +136,24 @@ impl Targets {
         film + writing
     }
 
-    /// Writes everything; returns the files.
-    pub(crate) fn write(&self, film: &Film) -> Result<Vec<PathBuf>, Failure> {
+    /// Writes everything; returns the files. The film keeps the layers that are written.
+    pub(crate) fn write(&self, film: &mut Film) -> Result<Vec<PathBuf>, Failure> {
         let mut files = Vec::new();
+        let encoded = match &self.picture {
+            Some((_, Form::Png)) => Some(self.encode(film)?),
+            _ => None,
+        };
+        film.keep(self.written);
+        let film = &*film;
         match &self.picture {
-            Some((None, _)) => self.write_to_stdout(film)?,
-            Some((Some(path), form)) => {
-                match form {
-                    Form::Png => write_png(path, film.width(), film.height(), &self.encode(film)),
-                    Form::Exr => write_exr(path, film),
-                    Form::Npy => write_npy(path, film, LayerKind::Color),
-                }?;
-                files.push(path.clone());
+            Some((path, form)) => {
+                match (path, form, encoded) {
+                    (Some(path), Form::Png, Some(map)) => write_png(path, map.width, map.height, &map.rgb)?,
+                    (Some(path), Form::Npy, _) => write_npy(path, film, LayerKind::Color)?,
+                    (Some(path), _, _) => write_exr(path, film)?,
+                    (None, _, encoded) => write_to_stdout(encoded)?,
+                }
+                files.extend(path.clone());
             }
             None => {}
         }
@@ -145,14 +171,11 @@ impl Targets {
         Ok(files)
     }
 
-    fn write_to_stdout(&self, film: &Film) -> Result<(), Failure> {
-        let mut bytes = Vec::new();
-        encode_png(&mut bytes, film.width(), film.height(), &self.encode(film))?;
-        report::to_stdout(&bytes)
-    }
-
     /// Three sRGB bytes a pixel.
-    pub(crate) fn encode(&self, film: &Film) -> Vec<u8> {
+    pub(crate) fn encode(&self, film: &Film) -> Result<HeatMap, Failure> {
+        if let Some(measure) = self.show {
+            return Ok(HeatMap::new(film, measure)?);
+        }
         let operator = if self.automatic {
             self.tone_map.exposed(automatic_exposure(&film.color))
         } else {
@@ -162,8 +185,36 @@ impl Targets {
         if self.tone_map == ToneMap::PreviousFrame {
             mapper.end_frame(IntensityRange::of(&film.color));
         }
-        mapper.encode(film)
+        Ok(HeatMap {
+            width: film.width(),
+            height: film.height(),
+            rgb: mapper.encode(film),
+        })
     }
+
+    /// Size of what is encoded of a picture of this size.
+    pub(crate) fn encoded_size(&self, width: u32, height: u32) -> [u32; 2] {
+        match self.show {
+            Some(_) => HeatMap::size(width, height),
+            None => [width, height],
+        }
+    }
+}
+
+/// These layers, and those that they are made of.
+fn with_sources(layers: Layers) -> Layers {
+    Layers {
+        prim: layers.prim || layers.motion,
+        bary: layers.bary || layers.motion,
+        ..layers
+    }
+}
+
+fn write_to_stdout(map: Option<HeatMap>) -> Result<(), Failure> {
+    let Some(map) = map else { return Ok(()) };
+    let mut bytes = Vec::new();
+    encode_png(&mut bytes, map.width, map.height, &map.rgb)?;
+    report::to_stdout(&bytes)
 }
 
 fn usage(message: impl std::fmt::Display) -> Failure {

@@ -3,9 +3,11 @@
 use std::time::Instant;
 
 use rayward::scene::{FrameGeometry, PosedCamera};
-use rayward::{Environment, Lens, Progress, RenderOptions, RenderedFrame, Renderer, Shutter};
+use rayward::{
+    Environment, Lens, Moment, Progress, RenderOptions, RenderedFrame, Renderer, Shutter, add_motion,
+};
 
-use crate::args::{PictureArgs, RenderArgs, ViewArgs};
+use crate::args::{PictureArgs, RenderArgs, RunArgs, ViewArgs};
 use crate::failure::{Code, Failure};
 use crate::gpu::Device;
 use crate::input::{self, Input};
@@ -14,7 +16,7 @@ use crate::output::Targets;
 use crate::progress::Bar;
 use crate::report;
 use crate::summary::{Summary, Times};
-use crate::values::Size;
+use crate::values::{GpuUse, Size};
 use crate::view::View;
 
 /// Renders, writes and tells what it cost.
@@ -36,6 +38,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     };
 
     check_memory(&options, targets.bytes_a_pixel())?;
+    check_costs(&options, &args.picture, &args.run)?;
 
     let bar = Bar::new(!args.run.quiet);
     bar.phase("reading");
@@ -67,11 +70,17 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         Ok::<_, Failure>((close, camera))
     };
     let closed = args.picture.shutter.map(close).transpose()?;
-    let rendered = picture(&mut renderer, (&frame, &view), closed.as_ref(), &options, &show)?;
+    // Nothing is before the first moment.
+    let moves = options.layers.motion && args.moment.time > 0.0;
+    let before = moves
+        .then(|| close(-args.motion_time.min(f64::from(args.moment.time))))
+        .transpose()?;
+    let others = (closed.as_ref(), before.as_ref());
+    let mut rendered = picture(&mut renderer, (&frame, &view), others, &options, &show)?;
     device.close(args.run.quiet)?;
     bar.phase("writing");
     let write_start = Instant::now();
-    let files = targets.write(&rendered.film)?;
+    let files = targets.write(&mut rendered.film)?;
     let write = write_start.elapsed();
     drop(bar);
 
@@ -117,19 +126,57 @@ fn check_not_empty(input: &Input, frame: &FrameGeometry) -> Result<(), Failure> 
     ))
 }
 
-/// The picture of a frame; `closed` is what is seen when the shutter closes, if there is one.
+/// Costs are told of structures that frames on the CPU without a lens or a shutter have.
+pub(crate) fn check_costs(
+    options: &RenderOptions,
+    picture: &PictureArgs,
+    run: &RunArgs,
+) -> Result<(), Failure> {
+    let other = [
+        (picture.aperture.is_some(), "--aperture"),
+        (picture.shutter.is_some(), "--shutter"),
+        (picture.reference, "--reference"),
+        (run.gpu != GpuUse::Off, "--gpu"),
+    ];
+    match other.into_iter().find(|(given, _)| *given) {
+        Some((_, name)) if options.layers.cost => Err(Failure::new(
+            Code::Usage,
+            format_args!("{name}: costs are counted of other structures than those it uses"),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Geometry and camera of another moment.
+pub(crate) type Other = (FrameGeometry, PosedCamera);
+
+/// The picture of a frame; others are what is seen when the shutter closes, and before, for motion, if asked for.
 pub(crate) fn picture(
     renderer: &mut Renderer,
     (frame, view): (&FrameGeometry, &View),
-    closed: Option<&(FrameGeometry, PosedCamera)>,
+    (closed, before): (Option<&Other>, Option<&Other>),
     options: &RenderOptions,
     show: &(dyn Fn(Progress) + Sync),
 ) -> Result<RenderedFrame, Failure> {
-    let Some((geometry, camera)) = closed else {
-        return Ok(renderer.render(frame, &view.camera, &view.lights, options, show)?);
-    };
-    let shutter = Shutter { geometry, camera };
-    Ok(renderer.render_shutter(frame, &view.camera, shutter, &view.lights, options, show)?)
+    let (camera, lights) = (&view.camera, &view.lights);
+    let mut rendered = match closed {
+        Some((geometry, closing)) => {
+            let shutter = Shutter {
+                geometry,
+                camera: closing,
+            };
+            renderer.render_shutter(frame, camera, shutter, lights, options, show)
+        }
+        None => renderer.render(frame, camera, lights, options, show),
+    }?;
+    if let Some((geometry, camera)) = before {
+        let now = Moment {
+            geometry: frame,
+            camera: &view.camera,
+        };
+        add_motion(&mut rendered.film, now, Moment { geometry, camera })?;
+    }
+    Ok(rendered)
 }
 
 /// A picture that cannot fit is an error now instead of a killed process later.

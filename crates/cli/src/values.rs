@@ -1,7 +1,7 @@
 //! Values of the command line: parsed, checked, and nothing else.
 
 use glam::{DVec3, Vec3};
-use rayward::{CasterPolicy, LayerKind, Layers, PixelFilter, Shard, scene};
+use rayward::{CasterPolicy, LayerKind, Layers, Measure, PixelFilter, Shard, scene};
 
 /// What a parser returns.
 type Parsed<T> = Result<T, String>;
@@ -328,7 +328,7 @@ pub(crate) enum Operator {
     PreviousFrame,
 }
 
-/// A layer by name, or all of them.
+/// A layer by name, or all but motion and cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum LayerName {
     All,
@@ -340,11 +340,53 @@ pub(crate) enum LayerName {
     Object,
     Prim,
     Bary,
+    Motion,
+    Cost,
 }
 
-/// The layers of these names; all if there are none. Colour is always there.
+/// A measure by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Shown {
+    /// Depth along the view
+    Depth,
+    /// Distance from the eye
+    Distance,
+    /// Length of motion vectors
+    Motion,
+    /// Nodes of the hierarchy for any ray that a pixel's rays open
+    Nodes,
+    /// Triangles that they test
+    Tests,
+    /// Cells of the layered depth cube that they look at, with --secondary cube
+    Cells,
+    /// Its texels
+    Texels,
+    /// Casters in the cells of light grids in which a pixel's surfaces lie
+    Casters,
+    /// Those that no surface has to be tested with, lying before the nearest
+    Spared,
+}
+
+impl From<Shown> for Measure {
+    fn from(shown: Shown) -> Self {
+        match shown {
+            Shown::Depth => Self::Depth,
+            Shown::Distance => Self::Distance,
+            Shown::Motion => Self::Motion,
+            Shown::Nodes => Self::Nodes,
+            Shown::Tests => Self::Tests,
+            Shown::Cells => Self::Cells,
+            Shown::Texels => Self::Texels,
+            Shown::Casters => Self::Casters,
+            Shown::Spared => Self::Spared,
+        }
+    }
+}
+
+/// The layers of these names; if there are none, all that cost nothing more. Colour is always there.
 pub(crate) fn layers(names: &[LayerName]) -> Layers {
-    let has = |name| names.is_empty() || names.contains(&LayerName::All) || names.contains(&name);
+    let named = |name| names.contains(&name);
+    let has = |name| names.is_empty() || named(LayerName::All) || named(name);
     Layers {
         alpha: has(LayerName::Alpha),
         depth: has(LayerName::Depth),
@@ -353,6 +395,8 @@ pub(crate) fn layers(names: &[LayerName]) -> Layers {
         object: has(LayerName::Object),
         prim: has(LayerName::Prim),
         bary: has(LayerName::Bary),
+        motion: named(LayerName::Motion),
+        cost: named(LayerName::Cost),
     }
 }
 

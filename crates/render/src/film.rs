@@ -11,7 +11,7 @@ use std::ops::Range;
 use glam::{Vec2, Vec3};
 
 use crate::error::check_size;
-use crate::{Part, Result};
+use crate::{Part, PixelCost, Result};
 
 /// Which layers a film holds besides its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,10 +30,14 @@ pub struct Layers {
     pub prim: bool,
     /// Barycentric weights of the triangle's corners 1 and 2; zero on the background.
     pub bary: bool,
+    /// How far what is seen has come in the picture, pixels to the right and down; see [`crate::add_motion`].
+    pub motion: bool,
+    /// What the rays of the pixel cost; see [`PixelCost`].
+    pub cost: bool,
 }
 
 impl Layers {
-    /// Every layer.
+    /// Every layer that one frame gives at no further cost: all but motion and cost.
     pub const ALL: Self = Self {
         alpha: true,
         depth: true,
@@ -42,7 +46,24 @@ impl Layers {
         object: true,
         prim: true,
         bary: true,
+        motion: false,
+        cost: false,
     };
+
+    /// Those that are in either.
+    pub fn or(self, other: Self) -> Self {
+        Self {
+            alpha: self.alpha || other.alpha,
+            depth: self.depth || other.depth,
+            distance: self.distance || other.distance,
+            normal: self.normal || other.normal,
+            object: self.object || other.object,
+            prim: self.prim || other.prim,
+            bary: self.bary || other.bary,
+            motion: self.motion || other.motion,
+            cost: self.cost || other.cost,
+        }
+    }
 
     /// Whether this layer is among them; colour always is.
     pub fn has(self, layer: LayerKind) -> bool {
@@ -55,6 +76,8 @@ impl Layers {
             LayerKind::Object => self.object,
             LayerKind::Prim => self.prim,
             LayerKind::Bary => self.bary,
+            LayerKind::Motion => self.motion,
+            LayerKind::Cost => self.cost,
         }
     }
 
@@ -68,6 +91,8 @@ impl Layers {
             object: self.object && other.object,
             prim: self.prim && other.prim,
             bary: self.bary && other.bary,
+            motion: self.motion && other.motion,
+            cost: self.cost && other.cost,
         }
     }
 
@@ -81,9 +106,11 @@ impl Layers {
             object,
             prim,
             bary,
+            motion,
+            cost,
         } = self;
         let words = [alpha, depth, distance, object, prim].map(|kept| (kept, 1));
-        let vectors = [(true, 3), (normal, 3), (bary, 2)];
+        let vectors = [(true, 3), (normal, 3), (bary, 2), (motion, 2), (cost, 6)];
         let kept = words.iter().chain(&vectors).filter(|(kept, _)| *kept);
         4 * kept.map(|(_, words)| words).sum::<u64>()
     }
@@ -108,11 +135,15 @@ pub enum LayerKind {
     Prim,
     /// See [`Layers::bary`].
     Bary,
+    /// See [`Layers::motion`].
+    Motion,
+    /// See [`Layers::cost`].
+    Cost,
 }
 
 impl LayerKind {
     /// Every kind of layer.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Color,
         Self::Alpha,
         Self::Depth,
@@ -121,6 +152,8 @@ impl LayerKind {
         Self::Object,
         Self::Prim,
         Self::Bary,
+        Self::Motion,
+        Self::Cost,
     ];
 
     /// The layer's name in files and on command lines.
@@ -134,6 +167,8 @@ impl LayerKind {
             Self::Object => "object",
             Self::Prim => "prim",
             Self::Bary => "bary",
+            Self::Motion => "motion",
+            Self::Cost => "cost",
         }
     }
 }
@@ -201,6 +236,10 @@ pub struct Film {
     pub prim: Vec<u32>,
     /// See [`Layers::bary`].
     pub bary: Vec<Vec2>,
+    /// See [`Layers::motion`].
+    pub motion: Vec<Vec2>,
+    /// See [`Layers::cost`].
+    pub cost: Vec<PixelCost>,
 }
 
 impl Film {
@@ -233,6 +272,8 @@ impl Film {
             object: layer(layers.object, object, pixels),
             prim: layer(layers.prim, prim, pixels),
             bary: layer(layers.bary, bary, pixels),
+            motion: layer(layers.motion, Vec2::ZERO, pixels),
+            cost: layer(layers.cost, PixelCost::default(), pixels),
         })
     }
 
@@ -266,6 +307,8 @@ impl Film {
             object: !self.object.is_empty(),
             prim: !self.prim.is_empty(),
             bary: !self.bary.is_empty(),
+            motion: !self.motion.is_empty(),
+            cost: !self.cost.is_empty(),
         };
     }
 
@@ -280,6 +323,8 @@ impl Film {
         drop_unless(layers.object, &mut film.object);
         drop_unless(layers.prim, &mut film.prim);
         drop_unless(layers.bary, &mut film.bary);
+        drop_unless(layers.motion, &mut film.motion);
+        drop_unless(layers.cost, &mut film.cost);
     }
 
     /// Takes over a range of pixels from a film of the same size and layers.
@@ -292,6 +337,8 @@ impl Film {
         copy(&mut self.object, &other.object, &pixels);
         copy(&mut self.prim, &other.prim, &pixels);
         copy(&mut self.bary, &other.bary, &pixels);
+        copy(&mut self.motion, &other.motion, &pixels);
+        copy(&mut self.cost, &other.cost, &pixels);
     }
 
     /// Whether it holds this layer.
@@ -328,6 +375,7 @@ impl Film {
         grid.split(&mut self.object, &mut tiles, |tile| &mut tile.object);
         grid.split(&mut self.prim, &mut tiles, |tile| &mut tile.prim);
         grid.split(&mut self.bary, &mut tiles, |tile| &mut tile.bary);
+        grid.split(&mut self.cost, &mut tiles, |tile| &mut tile.cost);
         tiles
     }
 }
@@ -397,6 +445,7 @@ pub struct TileMut<'a> {
     object: Vec<&'a mut [u32]>,
     prim: Vec<&'a mut [u32]>,
     bary: Vec<&'a mut [Vec2]>,
+    cost: Vec<&'a mut [PixelCost]>,
 }
 
 impl TileMut<'_> {
@@ -414,10 +463,11 @@ impl TileMut<'_> {
             object: Vec::new(),
             prim: Vec::new(),
             bary: Vec::new(),
+            cost: Vec::new(),
         }
     }
 
-    /// Writes what a pixel saw into the layers the film holds. The pixel's place is relative to the tile.
+    /// Writes what a pixel saw into the layers the film holds, but for motion and cost. The pixel's place is relative to the tile.
     ///
     /// # Panics
     /// If the pixel lies outside of the tile.
@@ -432,6 +482,11 @@ impl TileMut<'_> {
         set(&mut self.object, x, y, sample.object);
         set(&mut self.prim, x, y, sample.prim);
         set(&mut self.bary, x, y, sample.bary);
+    }
+
+    /// What a pixel has cost so far; `None` if the film does not hold it.
+    pub(crate) fn cost(&mut self, x: u32, y: u32) -> Option<&mut PixelCost> {
+        Some(&mut self.cost.get_mut(y as usize)?[x as usize])
     }
 
     /// One row of colours, for tiles that are written row by row.

@@ -6,7 +6,10 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use rayward_trace::exact::ExactHit;
-use rayward_trace::{Bvh, Ldc, LdcOptions, Light, Receiver, SurfaceRay, Triangles, ViewRay};
+use rayward_trace::ldc::StepCounts;
+use rayward_trace::{Bvh, Counters, Ldc, LdcOptions, Light, Receiver, SurfaceRay, Triangles, ViewRay};
+
+use crate::PixelCost;
 
 /// The first triangle that a ray meets, and where; `None` if it meets none.
 pub type SurfaceHit = Option<(u32, ExactHit)>;
@@ -25,6 +28,11 @@ pub trait SecondaryTracer: Debug + Send + Sync {
 
     /// Replaces `hits` by all triangles in front of the start of a ray, as parameters and ids in ascending order.
     fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>);
+
+    /// What following a ray takes; nothing from structures that do not count.
+    fn cost(&self, _ray: &SurfaceRay) -> PixelCost {
+        PixelCost::default()
+    }
 
     /// Whether any triangle lies between each receiver and the light, from structures that would rather have arrays
     /// than single rays; `None` from others.
@@ -96,7 +104,7 @@ impl SecondaryBuilder for CubeBuilder {
 
 /// For structures that have these questions as methods of their own.
 macro_rules! answers_itself {
-    ($($structure:ident),*) => {$(
+    ($($structure:ident, $counts:ident;)*) => {$(
         impl SecondaryTracer for $structure<'_> {
             fn trace(&self, rays: &[SurfaceRay], hits: &mut Vec<SurfaceHit>) {
                 hits.clear();
@@ -115,8 +123,14 @@ macro_rules! answers_itself {
             fn along(&self, ray: &ViewRay, hits: &mut Vec<(f64, u32)>) {
                 $structure::along(self, ray, &mut (), hits);
             }
+
+            fn cost(&self, ray: &SurfaceRay) -> PixelCost {
+                let mut counts = $counts::default();
+                self.after(ray, &mut counts);
+                counts.into()
+            }
         }
     )*};
 }
 
-answers_itself!(Bvh, Ldc);
+answers_itself!(Bvh, Counters; Ldc, StepCounts;);

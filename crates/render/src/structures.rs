@@ -10,6 +10,7 @@ use rayward_trace::{
 };
 
 use crate::casters::CasterRules;
+use crate::costs::Measured;
 use crate::geometry::triangles;
 use crate::plan::{FramePlan, LightPlan};
 use crate::reference::EveryTriangle;
@@ -38,6 +39,8 @@ pub struct FrameStructures<'g> {
     pub others: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// The same, if hard shadows of all pixels are asked of it.
     pub shadows: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// What is asked of again, to tell what rays cost.
+    pub(crate) measured: Option<Measured<'g>>,
     /// Whether any triangle is masked or blended.
     pub transparent: bool,
     /// What each structure cost.
@@ -96,7 +99,8 @@ impl<'g> FrameStructures<'g> {
         // It knows of no triangles that cast by one side alone.
         let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
         let solids = !geometry.solids.is_empty();
-        let general = (through || plan.secondary || shadows || solids)
+        let costs = options.layers.cost;
+        let general = (through || plan.secondary || shadows || solids || costs)
             .then(|| general(triangles, options, builder, &mut stats));
         let asked = general.as_deref().filter(|_| shadows);
 
@@ -148,9 +152,14 @@ impl<'g> FrameStructures<'g> {
                 |veils| [veils.bytes(), veils.cell_count(), veils.reference_count()],
             )
         });
+        let measured = general.clone().filter(|_| costs).map(|any| Measured {
+            any,
+            lights: light_grids(plan, geometry, rules, options),
+        });
         Self {
             eye,
             visibility,
+            measured,
             lights,
             veils,
             light_veils,
@@ -311,6 +320,21 @@ fn veils_before<'g>(
         }
     };
     PointLightGrid::build(plan.light, triangles(geometry), &rule, plan.grid, level)
+}
+
+/// The grids of all lights without a size, over all that casts.
+fn light_grids<'g>(
+    plan: &FramePlan,
+    geometry: &'g FrameGeometry,
+    rules: &CasterRules<'g>,
+    options: &RenderOptions,
+) -> Vec<PointLightGrid<'g>> {
+    let points = plan.lights.iter().flatten().filter(|plan| plan.area.is_none());
+    let grid = |plan: &LightPlan| {
+        let rule = rules.for_light(geometry, &plan.light);
+        PointLightGrid::build(plan.light, triangles(geometry), &rule, plan.grid, options.level)
+    };
+    points.map(grid).collect()
 }
 
 /// Builds what tells the shadows of one light.

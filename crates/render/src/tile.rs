@@ -161,6 +161,9 @@ impl TileShader<'_> {
         for point in &work.points {
             out.color_row(point.y)[point.x as usize] += point.color * point.weight;
         }
+        if let Some(measured) = &self.structures.measured {
+            self.measure(measured, work, out);
+        }
         self.go_on(&tile, work, out);
         TileCounts {
             shadow_rays: work.scratch.counts.receivers + work.area.counts.samples + work.bounce.shadow_rays,

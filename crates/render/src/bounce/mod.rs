@@ -258,6 +258,9 @@ impl TileShader<'_> {
             work.secondary_rays += work.rays.len() as u64;
             work.arrivals.clear();
             work.next.clear();
+            for flight in &work.flights {
+                self.measure_ray(flight.pixel, &flight.ray, out);
+            }
             for (flight, hit) in work.flights.iter().zip(&work.hits) {
                 let end = hit.map_or(f64::INFINITY, |(_, hit)| hit.t);
                 if let Some(solid) = self.solid_before(flight, end) {

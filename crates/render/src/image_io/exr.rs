@@ -8,6 +8,8 @@
 //! | normal | `N.X N.Y N.Z` | f32 |
 //! | object, prim | `id.object`, `id.prim` | u32 |
 //! | bary | `bary.u bary.v` | f32 |
+//! | motion | `motion.X motion.Y` | f32 |
+//! | cost | `cost.nodes` and so on, [`PixelCost::NAMES`] | f32 |
 //!
 //! A part of a picture has two texts besides: `raywardShard`, like `2/4`, and `raywardPicture`, the checksum of the picture
 //! in hexadecimal digits.
@@ -24,7 +26,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::file;
 use super::picture::{Picture, SizeCheck};
-use crate::{Error, Film, Layers, Part, Result};
+use crate::{Error, Film, Layers, Part, PixelCost, Result};
 
 /// Names of the texts that a part of a picture has.
 const SHARD: &str = "raywardShard";
@@ -65,7 +67,13 @@ fn encode(sink: impl Write + Seek, film: &Film) -> io::Result<()> {
         AnyChannel::new("id.prim", FlatSamples::U32(film.prim.clone())),
         floats("bary.u", &film.bary, |b| b.x),
         floats("bary.v", &film.bary, |b| b.y),
+        floats("motion.X", &film.motion, |m| m.x),
+        floats("motion.Y", &film.motion, |m| m.y),
     ];
+    for (number, name) in PixelCost::NAMES.iter().enumerate() {
+        let name = format!("cost.{name}");
+        channels.push(floats(&name, &film.cost, |cost| cost.to_array()[number]));
+    }
     channels.retain(|channel| channel.sample_data.len() > 0);
     let mut attributes = LayerAttributes {
         software_name: Some("rayward".into()),
@@ -147,15 +155,19 @@ pub(super) fn decode_part(check: SizeCheck, bytes: &[u8]) -> Result<(Film, Part)
     let (mut floats, mut ids) = (Vec::new(), Vec::new());
     for channel in &layer.channel_data.list {
         match &channel.sample_data {
-            FlatSamples::F32(values) if values.len() == pixels => floats.push((&channel.name, values)),
-            FlatSamples::U32(values) if values.len() == pixels => ids.push((&channel.name, values)),
+            FlatSamples::F32(values) if values.len() == pixels => {
+                floats.push((channel.name.to_string(), values))
+            }
+            FlatSamples::U32(values) if values.len() == pixels => {
+                ids.push((channel.name.to_string(), values))
+            }
             _ => {}
         }
     }
-    let float = |name: &str| Some(floats.iter().find(|(own, _)| own.eq(name))?.1);
+    let float = |name: &str| Some(floats.iter().find(|(own, _)| own == name)?.1);
     let pair = |u: &str, v: &str| Some((float(u)?, float(v)?));
     let triple = |x: &str, y: &str, z: &str| Some((float(x)?, float(y)?, float(z)?));
-    let id = |name: &str| Some(ids.iter().find(|(own, _)| own.eq(name))?.1.clone());
+    let id = |name: &str| Some(ids.iter().find(|(own, _)| own == name)?.1.clone());
     let vectors = |(x, y, z): (&Vec<f32>, &Vec<f32>, &Vec<f32>)| -> Vec<Vec3> {
         (0..pixels).map(|i| Vec3::new(x[i], y[i], z[i])).collect()
     };
@@ -176,9 +188,21 @@ pub(super) fn decode_part(check: SizeCheck, bytes: &[u8]) -> Result<(Film, Part)
     film.object = id("id.object").unwrap_or_default();
     film.prim = id("id.prim").unwrap_or_default();
     film.bary = pair("bary.u", "bary.v").map(points).unwrap_or_default();
+    film.motion = pair("motion.X", "motion.Y").map(points).unwrap_or_default();
+    film.cost = costs(&float).unwrap_or_default();
     film.note_layers();
     film.part = Some(part);
     Ok((film, part))
+}
+
+/// The costs, from their channels.
+fn costs<'c>(float: &impl Fn(&str) -> Option<&'c Vec<f32>>) -> Option<Vec<PixelCost>> {
+    let mut channels: [&[f32]; 6] = [&[]; 6];
+    for (channel, name) in channels.iter_mut().zip(PixelCost::NAMES) {
+        *channel = float(&format!("cost.{name}"))?;
+    }
+    let pixel = |i: usize| channels.map(|channel| channel[i]).into();
+    Some((0..channels[0].len()).map(pixel).collect())
 }
 
 /// The colour of the first part that has any.

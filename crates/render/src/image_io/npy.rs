@@ -1,7 +1,7 @@
 //! NumPy arrays, format 1.0: one layer of a film, little endian, C order.
 //!
 //! Shapes: `(height, width)` for scalars, `(height, width, 3)` for colour and normal, `(height, width, 2)` for
-//! barycentrics. Types: `<f4`, `<u4` for ids.
+//! barycentrics and motion, `(height, width, 6)` for costs. Types: `<f4`, `<u4` for ids.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -78,6 +78,19 @@ fn encode(mut sink: impl Write, film: &Film, layer: LayerKind) -> io::Result<()>
             "<f4",
             2,
             &mut film.bary.iter().flat_map(|b| b.to_array().map(f32::to_le_bytes)),
+        ),
+        LayerKind::Motion => put(
+            "<f4",
+            2,
+            &mut film
+                .motion
+                .iter()
+                .flat_map(|m| m.to_array().map(f32::to_le_bytes)),
+        ),
+        LayerKind::Cost => put(
+            "<f4",
+            6,
+            &mut film.cost.iter().flat_map(|c| c.to_array().map(f32::to_le_bytes)),
         ),
     }
 }

@@ -21,7 +21,7 @@ pub fn join_parts(paths: &[PathBuf], limit: u64, mut read: impl FnMut()) -> Resu
         let bytes = file::read(path)?;
         let (film, part) = exr::decode_part(SizeCheck::new(path, limit), &bytes)?;
         let (whole, first) = joined.get_or_insert_with(|| (film.clone(), part));
-        check(path, &film, part, (whole, *first, &paths[0]))?;
+        check(path, &film, part, (&*whole, *first, paths[0].as_path()))?;
         if let Some(other) = of_shard.insert(part.shard.index(), path) {
             let problem = format!("it is part {} as {} is", part.shard, other.display());
             return Err(Error::malformed(path, problem));
