@@ -3,9 +3,9 @@
 //! Vertices are projected in f64 and rounded once, see [`super::project`]. Cost: about 40 operations a vertex, 40
 //! instructions and 12 stores a triangle.
 
-use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*};
+use fearless_simd::{Simd, dispatch, f32x16, i32x16, mask32x16, prelude::*};
 
-use super::edges::VertexLanes;
+use super::edges::{VertexLanes, area_error, coordinate_error};
 use super::pixels::LIGHT_TILE;
 use super::project::project_lanes;
 use super::{LANES, NEARNESS_BAND, SimdLevel, bits_of, load3, max3, min3};
@@ -17,6 +17,21 @@ use crate::view::View;
 pub(crate) struct LightRaster<'v> {
     pub(crate) view: &'v View,
     pub(crate) tiles: u32,
+    /// See [`View::rounding`].
+    pub(crate) rounding: f32,
+    /// Whether front faces turn from x to y in the raster: the sign of a triangle's area is the side that the light sees.
+    pub(crate) right_handed: bool,
+}
+
+impl<'v> LightRaster<'v> {
+    pub(crate) fn new(view: &'v View, tiles: u32) -> Self {
+        Self {
+            view,
+            tiles,
+            rounding: view.rounding() as f32,
+            right_handed: view.right.cross(view.up).dot(view.forward) > 0.0,
+        }
+    }
 }
 
 /// The triangles of a cluster, in batches of sixteen.
@@ -42,6 +57,17 @@ pub(crate) struct CasterBatch {
     pub(crate) ahead: u32,
     /// A bit for each that lies neither in front nor behind.
     pub(crate) crossing: u32,
+    /// A bit for each whose front the light certainly sees, and for each whose back it does.
+    pub(crate) sides: [u32; 2],
+}
+
+impl CasterBatch {
+    /// Whether the light sees a triangle's front, if that is certain.
+    #[inline(always)]
+    pub(crate) fn front(&self, lane: usize) -> Option<bool> {
+        let [front, back] = self.sides.map(|lanes| lanes >> lane & 1 != 0);
+        (front || back).then_some(front)
+    }
 }
 
 impl Default for CasterLanes {
@@ -134,4 +160,20 @@ fn place<S: Simd>(simd: S, raster: &LightRaster, used: u32, batch: &mut CasterBa
     }
     batch.ahead = bits_of(simd, seen) & used;
     batch.crossing = !bits_of(simd, ahead | behind) & used;
+    let [positive, negative] = orientations(simd, raster.rounding, &batch.corners);
+    let (positive, negative) = (bits_of(simd, positive & known), bits_of(simd, negative & known));
+    batch.sides = if raster.right_handed {
+        [positive, negative]
+    } else {
+        [negative, positive]
+    };
+}
+
+/// The triangles whose area in the raster certainly is positive, and those whose certainly is negative.
+#[inline(always)]
+fn orientations<S: Simd>(simd: S, rounding: f32, corners: &VertexLanes) -> [mask32x16<S>; 2] {
+    let (x, y) = (load3(simd, &corners.x), load3(simd, &corners.y));
+    let area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
+    let error = area_error(simd, x, y, coordinate_error(simd, x, y, rounding)) * f32x16::splat(simd, 2.0);
+    [area.simd_gt(error), area.simd_lt(-error)]
 }

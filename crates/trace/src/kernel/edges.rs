@@ -163,9 +163,32 @@ pub(crate) fn set_up<S: Simd>(simd: S, v: &VertexLanes, origin: Origin, rounding
             reach: [splat(MARGIN); 2],
         },
     };
-    // Half an ulp of the largest coordinate: vertices, and raster points that were projected themselves.
-    let eps = largest(x, y) * splat(1.05 * ROUNDOFF) + splat(rounding);
+    let eps = coordinate_error(simd, x, y, rounding);
     set_up_lanes(simd, [x, y, nearness], &origin, eps, out);
+}
+
+/// Bound on the error of coordinates that were rounded once: half an ulp of the largest, of vertices and of raster points
+/// that were projected themselves.
+#[inline(always)]
+pub(crate) fn coordinate_error<S: Simd>(
+    simd: S,
+    x: [f32x16<S>; 3],
+    y: [f32x16<S>; 3],
+    rounding: f32,
+) -> f32x16<S> {
+    largest(x, y) * f32x16::splat(simd, 1.05 * ROUNDOFF) + f32x16::splat(simd, rounding)
+}
+
+/// Bound on the error of a triangle's area in the raster, twice its size, if coordinates are off by `eps`.
+#[inline(always)]
+pub(crate) fn area_error<S: Simd>(
+    simd: S,
+    x: [f32x16<S>; 3],
+    y: [f32x16<S>; 3],
+    eps: f32x16<S>,
+) -> f32x16<S> {
+    let (w, h) = (max3(x) - min3(x), max3(y) - min3(y));
+    eps * f32x16::splat(simd, 4.0) * (w + h) + f32x16::splat(simd, 8.0 * ROUNDOFF) * w * h
 }
 
 /// Largest magnitude of a coordinate.
@@ -203,7 +226,7 @@ pub(crate) fn set_up_lanes<S: Simd>(
     let (x01, y01) = (x[1] - x[0], y[1] - y[0]);
     let (x02, y02) = (x[2] - x[0], y[2] - y[0]);
     let area = x01 * y02 - x02 * y01;
-    let area_error = eps * splat(4.0) * (w + h) + splat(8.0 * ROUNDOFF) * w * h;
+    let area_error = area_error(simd, x, y, eps);
     let orientation = splat(1.0).copysign(area);
 
     // How far, at most, an evaluated point lies from any vertex, and how far the origin from either.

@@ -12,7 +12,6 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::FaceScene;
-use crate::Triangles;
 use crate::clusters::Clusters;
 use crate::kernel::casters::{CasterBatch, CasterLanes, LightRaster, sift_casters};
 use crate::kernel::pixels::LIGHT_TILE;
@@ -20,6 +19,7 @@ use crate::kernel::{LANES, NEARNESS_BAND};
 use crate::light_grid::takes_part;
 use crate::precise::PreciseTriangle;
 use crate::view::Arrangement;
+use crate::{Casts, Triangles};
 
 /// Clusters done by one task.
 const CHUNK: usize = 128;
@@ -149,6 +149,7 @@ struct Finder<'f> {
     /// Per light tile, the nearness of the farthest receiver.
     farthest: &'f [f32],
     tiles: u32,
+    raster: LightRaster<'f>,
     found: &'f mut CasterChunk,
 }
 
@@ -158,6 +159,7 @@ impl FaceScene<'_> {
         let placed = self.placed;
         let tiles = self.view.width / LIGHT_TILE;
         chunks.resize_with(placed.chunks.len(), CasterChunk::default);
+        let raster = LightRaster::new(self.view, tiles);
         let both = placed.chunks.par_iter().zip(&mut *chunks).enumerate();
         both.for_each_init(CasterLanes::default, |lanes, (i, (chunk, found))| {
             found.casters.clear();
@@ -166,6 +168,7 @@ impl FaceScene<'_> {
                 scene: self,
                 farthest,
                 tiles,
+                raster,
                 found,
             };
             let mut start = 0;
@@ -223,10 +226,8 @@ impl Finder<'_> {
     }
 
     fn take_cluster(&mut self, index: usize, points: &[[f32; LANES]], lanes: &mut CasterLanes) {
-        let (view, tiles) = (self.scene.view, self.tiles);
         let cluster = self.scene.placed.clusters.cluster(index);
-        let raster = LightRaster { view, tiles };
-        let batches = sift_casters(self.scene.level, &raster, points, cluster.corners, lanes);
+        let batches = sift_casters(self.scene.level, &self.raster, points, cluster.corners, lanes);
         for (batch, prims) in lanes.batches[..batches].iter().zip(cluster.prims.chunks(LANES)) {
             for (lane, &prim) in prims.iter().enumerate() {
                 if batch.ahead >> lane & 1 != 0 {
@@ -244,7 +245,7 @@ impl Finder<'_> {
         let tile = |i: usize| batch.tiles[i][lane] as u32;
         let rect = [tile(0), tile(1), tile(2), tile(3)];
         let nearest = batch.nearest[lane];
-        if !self.any_tile(rect, nearest) || !self.casts(prim) {
+        if !self.any_tile(rect, nearest) || !self.casts(prim, batch.front(lane)) {
             return;
         }
         let [x0, y0, x1, y1] = rect;
@@ -273,7 +274,7 @@ impl Finder<'_> {
         let Some([min, max]) = precise.bounds(view) else {
             return;
         };
-        if !self.casts(prim) {
+        if !self.casts(prim, None) {
             return;
         }
         let rect = [
@@ -304,9 +305,14 @@ impl Finder<'_> {
         }
     }
 
-    fn casts(&self, prim: u32) -> bool {
+    /// Whether a triangle casts, of which the light sees the front, or not, if that is known.
+    #[inline]
+    fn casts(&self, prim: u32, front: Option<bool>) -> bool {
         let FaceScene { query, triangles, .. } = self.scene;
-        takes_part(&query.light, triangles, (query.rule)(prim), prim)
+        match ((query.rule)(prim), front) {
+            (Casts::Back, Some(front)) => !front,
+            (casts, _) => takes_part(&query.light, triangles, casts, prim),
+        }
     }
 
     /// Refers to the next caster from a light tile.

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::*;
+use crate::kernel::casters::{CasterLanes, LightRaster, sift_casters};
 use crate::test_meshes::{Mesh, axes, looking};
 use crate::{Accel, BruteForce, Casts, EyeGrid, EyeGridOptions, Receiver};
 
@@ -323,4 +324,46 @@ fn the_second_of_two_equal_triangles_casts() {
     let none: CastRule = &|_| Casts::Nothing;
     let [_, all, ..] = check("copies", &mesh, view, &query(light, &view, none));
     assert!(lit < all, "{lit} {all}");
+}
+
+/// What the lanes call the front of a triangle is what the exact decision does, and they know of nearly all.
+#[test]
+fn sides_are_those_of_the_exact_decision() {
+    let (mut known, mut all) = (0, 0);
+    for (mesh, light) in [Mesh::blob(24), Mesh::soup(5, 600, 0.2, 1.0)]
+        .iter()
+        .flat_map(|mesh| lights().into_iter().map(move |light| (mesh, light)))
+    {
+        let triangles = mesh.triangles();
+        let clusters = Clusters::new(&triangles);
+        let faces = crate::light_views::views(&light, &triangles, None, None).expect("it is finite");
+        for (view, level) in faces
+            .views
+            .iter()
+            .flat_map(|view| SimdLevel::available().into_iter().map(move |level| (view, level)))
+        {
+            let size = [f64::from(view.width), f64::from(view.height)];
+            let view = view.window([0.0; 2], size, [4 * LIGHT_TILE; 2]);
+            let raster = LightRaster::new(&view, 4);
+            let mut lanes = CasterLanes::default();
+            for index in 0..clusters.len() {
+                let (cluster, mut points) = (clusters.cluster(index), Vec::new());
+                clusters.place(index, &triangles, &mut points);
+                sift_casters(level, &raster, &points, cluster.corners, &mut lanes);
+                for (i, &prim) in cluster.prims.iter().enumerate() {
+                    let batch = &lanes.batches[i / 16];
+                    if batch.ahead >> (i % 16) & 1 == 0 {
+                        continue;
+                    }
+                    all += 1;
+                    if let Some(front) = batch.front(i % 16) {
+                        known += 1;
+                        let side = exact::side(triangles.corners(prim), &light);
+                        assert!(side != 0.0 && (side > 0.0) == front, "{light:?} {prim}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(known > 10_000 && known * 100 > all * 97, "{known} of {all}");
 }
