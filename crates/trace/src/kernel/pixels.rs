@@ -171,33 +171,29 @@ pub(crate) struct Span {
     pub(crate) plane: u32,
 }
 
-/// Finds the spans of a tile. `plane_of` tells the position of a triangle's plane, or `None` if its pixels do not ask.
+/// Finds the spans of a tile. `plane_of` tells the position of a triangle's plane.
 pub(crate) fn find_spans(
     level: SimdLevel,
     prims: &[[u32; LANES]],
-    plane_of: &mut dyn FnMut(u32) -> Option<u32>,
+    plane_of: &mut dyn FnMut(u32) -> u32,
     spans: &mut Vec<Span>,
-    asked: &mut Vec<u16>,
 ) {
     spans.clear();
-    asked.clear();
-    dispatch!(level.0, simd => find_spans_impl(simd, prims, plane_of, spans, asked));
+    dispatch!(level.0, simd => find_spans_impl(simd, prims, plane_of, spans));
 }
 
 #[inline(always)]
 fn find_spans_impl<S: Simd>(
     simd: S,
     prims: &[[u32; LANES]],
-    plane_of: &mut dyn FnMut(u32) -> Option<u32>,
+    plane_of: &mut dyn FnMut(u32) -> u32,
     spans: &mut Vec<Span>,
-    asked: &mut Vec<u16>,
 ) {
     // Neighbouring blocks often see the same triangle.
-    let mut last = (NONE, None);
+    let mut last = (NONE, 0);
     for (block, prims) in prims.iter().enumerate() {
         let lanes = u32x16::from_slice(simd, prims);
         let mut left = !equal(simd, lanes, NONE) & (u32::MAX >> (32 - LANES));
-        let mut asks = 0;
         while left != 0 {
             let prim = prims[left.trailing_zeros() as usize];
             let pixels = equal(simd, lanes, prim);
@@ -205,16 +201,12 @@ fn find_spans_impl<S: Simd>(
             if prim != last.0 {
                 last = (prim, plane_of(prim));
             }
-            if let Some(plane) = last.1 {
-                asks |= pixels as u16;
-                spans.push(Span {
-                    block: block as u32,
-                    pixels,
-                    plane,
-                });
-            }
+            spans.push(Span {
+                block: block as u32,
+                pixels,
+                plane: last.1,
+            });
         }
-        asked.push(asks);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The pixels of each of the eye's tiles as receivers in a light's raster.
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use super::LightQuery;
@@ -78,7 +79,12 @@ const PARTS: usize = 1024;
 struct GatherWork {
     rays: TileRays,
     spans: Vec<Span>,
+    /// The triangles seen in a tile, their corners and planes.
+    prims: Vec<u32>,
+    corners: Vec<[Vec3; 3]>,
     planes: Vec<PixelPlane>,
+    /// Whether each turns the side that is seen to the light.
+    faces: Vec<bool>,
     table: PrimTable,
     t: Vec<[f64; LANES]>,
     asked: Vec<u16>,
@@ -136,33 +142,46 @@ impl GatherWork {
         tile: &VisibleTile,
         level: SimdLevel,
     ) {
-        let Self {
-            spans,
-            planes,
-            table,
-            asked,
-            ..
-        } = self;
-        planes.clear();
-        table.clear();
-        let view = visibility.view();
-        let in_lanes = matches!(view.arrangement, Arrangement::Perspective);
+        self.prims.clear();
+        self.table.clear();
+        let (prims, table) = (&mut self.prims, &mut self.table);
         let mut plane_of = |prim: u32| {
             table.entry(prim, || {
-                let ends = [&query.light, &query.eye];
-                let corners = triangles.corners(prim);
-                let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
-                let faces = match fronts {
-                    [Some(lit), Some(seen)] => lit == seen,
-                    _ => query.faces(triangles, prim),
-                };
-                faces.then(|| {
-                    planes.push(if in_lanes { plane } else { plane.unsound() });
-                    planes.len() as u32 - 1
-                })
+                prims.push(prim);
+                prims.len() as u32 - 1
             })
         };
-        find_spans(level, &tile.prims, &mut plane_of, spans, asked);
+        find_spans(level, &tile.prims, &mut plane_of, &mut self.spans);
+        self.find_planes(visibility, triangles, query);
+        self.asked.clear();
+        self.asked.resize(tile.prims.len(), 0);
+        let (faces, asked) = (&self.faces, &mut self.asked);
+        self.spans.retain(|span| {
+            let asks = faces[span.plane as usize];
+            asked[span.block as usize] |= if asks { span.pixels as u16 } else { 0 };
+            asks
+        });
+    }
+
+    /// The planes of the triangles that are seen. Corners may lie anywhere in memory: they are read in a loop of its own,
+    /// so that the processor waits for several at a time.
+    fn find_planes(&mut self, visibility: &Visibility, triangles: &Triangles, query: &LightQuery) {
+        let view = visibility.view();
+        let in_lanes = matches!(view.arrangement, Arrangement::Perspective);
+        let ends = [&query.light, &query.eye];
+        self.corners.clear();
+        self.corners
+            .extend(self.prims.iter().map(|&prim| triangles.corners(prim)));
+        self.planes.clear();
+        self.faces.clear();
+        for (&prim, &corners) in self.prims.iter().zip(&self.corners) {
+            let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
+            self.faces.push(match fronts {
+                [Some(lit), Some(seen)] => lit == seen,
+                _ => query.faces(triangles, prim),
+            });
+            self.planes.push(if in_lanes { plane } else { plane.unsound() });
+        }
     }
 
     /// Hit parameters of all pixels that ask.
@@ -202,10 +221,10 @@ impl GatherWork {
     }
 }
 
-/// What is known of the triangles seen in a tile: open addressing, emptied by counting up.
+/// Positions of the triangles seen in a tile: open addressing, emptied by counting up.
 #[derive(Default)]
 struct PrimTable {
-    slots: Vec<(u32, u32, Option<u32>)>,
+    slots: Vec<(u32, u32, u32)>,
     round: u32,
     used: usize,
 }
@@ -215,12 +234,12 @@ impl PrimTable {
         self.round += 1;
         self.used = 0;
         if self.slots.is_empty() {
-            self.slots.resize(1024, (0, 0, None));
+            self.slots.resize(1024, (0, 0, 0));
         }
     }
 
     #[inline]
-    fn entry(&mut self, prim: u32, make: impl FnOnce() -> Option<u32>) -> Option<u32> {
+    fn entry(&mut self, prim: u32, make: impl FnOnce() -> u32) -> u32 {
         if self.used * 2 > self.slots.len() {
             self.grow();
         }
@@ -248,7 +267,7 @@ impl PrimTable {
 
     #[cold]
     fn grow(&mut self) {
-        let larger = vec![(0, 0, None); self.slots.len() * 2];
+        let larger = vec![(0, 0, 0); self.slots.len() * 2];
         for (round, prim, value) in std::mem::replace(&mut self.slots, larger) {
             if round == self.round {
                 let slot = self.slot(prim);
