@@ -46,8 +46,8 @@ mod plan;
 mod reference;
 mod secondary;
 pub mod shade;
-mod solids;
 mod shard;
+mod solids;
 mod stats;
 mod structures;
 pub mod texture;
@@ -75,8 +75,8 @@ pub use secondary::{
     BuiltTracer, CubeBuilder, HierarchyBuilder, SecondaryBuilder, SecondaryTracer, SurfaceHit,
 };
 pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
-pub use solids::solids;
 pub use shard::{Part, Shard};
+pub use solids::solids;
 pub use stats::{FrameStats, StructureStats};
 pub use structures::{FrameStructures, LightShadows};
 pub use tonemap::{IntensityRange, ToneMap, ToneMapper};
