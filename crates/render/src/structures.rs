@@ -59,7 +59,7 @@ pub enum LightShadows<'g> {
     /// By samples of its area.
     Area(AreaLightTree<'g>),
     /// The same through a 3-D grid, as in the paper.
-    AreaGrid(AreaLightGrid<'g>),
+    AreaGrid(Box<AreaLightGrid<'g>>),
     /// By every triangle, for references.
     Reference,
 }
@@ -98,9 +98,8 @@ impl<'g> FrameStructures<'g> {
         let through = (soft || options.reference) && rules.any_transparent();
         // It knows of no triangles that cast by one side alone.
         let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
-        let solids = !geometry.solids.is_empty();
         let costs = options.layers.cost;
-        let general = (through || plan.secondary || shadows || solids || costs)
+        let general = (through || plan.secondary || shadows || costs || !geometry.solids.is_empty())
             .then(|| general(triangles, options, builder, &mut stats));
         let asked = general.as_deref().filter(|_| shadows);
 
@@ -166,7 +165,7 @@ impl<'g> FrameStructures<'g> {
             layers: general.clone().filter(|_| through),
             transparent: rules.any_transparent(),
             secondary: general.clone().filter(|_| plan.secondary),
-            others: general.clone().filter(|_| solids),
+            others: general.clone().filter(|_| !geometry.solids.is_empty()),
             shadows: general.filter(|_| shadows),
             stats: stats.0,
         }
@@ -351,7 +350,8 @@ fn shadows_of<'g>(
     if let Some(area) = plan.area {
         let rule = rules.for_area(geometry, &area);
         if let Some(cells) = &plan.soft_grid {
-            return LightShadows::AreaGrid(AreaLightGrid::build(area, triangles, &rule, cells));
+            let grid = AreaLightGrid::build(area, triangles, &rule, cells);
+            return LightShadows::AreaGrid(Box::new(grid));
         }
         let tree = AreaLightTree::build(area, triangles, &rule, level);
         return LightShadows::Area(tree.with_topology(rules.topology()));

@@ -71,29 +71,8 @@ impl TileShader<'_> {
                 work.asked.push((i as u32, radiance));
             }
         }
-        match (&self.structures.lights[light], &self.reference) {
-            (LightShadows::Area(tree), _) => tree.visible(
-                &work.receivers,
-                &work.pixels,
-                &samples,
-                &mut work.area,
-                &mut work.visible,
-            ),
-            (LightShadows::AreaGrid(grid), _) => grid.visible(
-                &work.receivers,
-                &work.pixels,
-                &samples,
-                &mut work.area,
-                &mut work.visible,
-            ),
-            (_, Some(every)) => every.visible(
-                &|prim| self.is_opaque(prim),
-                area,
-                &samples,
-                (&work.receivers, &work.pixels),
-                &mut work.visible,
-            ),
-            _ => return,
+        if !self.find_visible(light, area, &samples, work) {
+            return;
         }
         let share = 1.0 / samples.count() as f32;
         let somebody = (0..work.receivers.len()).filter(|&n| !work.receivers[n].point.is_nan());
@@ -128,6 +107,27 @@ impl TileShader<'_> {
             }
             work.points[i as usize].color += sum * share;
         }
+    }
+
+    /// Finds which samples each receiver sees; `false` if nothing tells.
+    fn find_visible(&self, light: usize, area: &AreaLight, samples: &Samples, work: &mut TileWork) -> bool {
+        let TileWork {
+            receivers,
+            pixels,
+            area: scratch,
+            visible,
+            ..
+        } = work;
+        match (&self.structures.lights[light], &self.reference) {
+            (LightShadows::Area(tree), _) => tree.visible(receivers, pixels, samples, scratch, visible),
+            (LightShadows::AreaGrid(grid), _) => grid.visible(receivers, pixels, samples, scratch, visible),
+            (_, Some(every)) => {
+                let opaque = |prim| self.is_opaque(prim);
+                every.visible(&opaque, area, samples, (receivers, pixels), visible);
+            }
+            _ => return false,
+        }
+        true
     }
 
     /// Whether some of a light may be on the side of a surface that the eye sees.

@@ -162,7 +162,7 @@ impl Solid {
             }
             Self::Box { center, half } => {
                 let reach = half[0].abs() + half[1].abs() + half[2].abs();
-                let flat = half.iter().any(|half| *half == DVec3::ZERO);
+                let flat = half.contains(&DVec3::ZERO);
                 (!flat).then(|| usable([*center - reach, *center + reach]))?
             }
             Self::Union(both) => match (both[0].bounds(), both[1].bounds()) {
