@@ -17,7 +17,7 @@ pub(crate) fn gpu() -> Option<Gpu> {
 }
 
 /// Deterministic numbers in [-1, 1).
-pub(crate) struct Numbers(u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
     pub(crate) fn next(&mut self) -> f32 {

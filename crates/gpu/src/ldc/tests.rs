@@ -4,9 +4,7 @@ use std::collections::BTreeSet;
 
 use glam::{DVec3, Vec3};
 use rayward_trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, TexelSample};
-use rayward_trace::{
-    Accel, BruteForce, Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, SurfaceRay, Triangles,
-};
+use rayward_trace::{Accel, BruteForce, Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, SurfaceRay};
 
 use super::{Cube, CubeOptions};
 use crate::test_meshes::{Mesh, Numbers, gpu, meshes, rays};

@@ -156,10 +156,10 @@ pub(super) fn decode_part(check: SizeCheck, bytes: &[u8]) -> Result<(Film, Part)
     for channel in &layer.channel_data.list {
         match &channel.sample_data {
             FlatSamples::F32(values) if values.len() == pixels => {
-                floats.push((channel.name.to_string(), values))
+                floats.push((channel.name.to_string(), values));
             }
             FlatSamples::U32(values) if values.len() == pixels => {
-                ids.push((channel.name.to_string(), values))
+                ids.push((channel.name.to_string(), values));
             }
             _ => {}
         }
