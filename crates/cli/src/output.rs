@@ -145,17 +145,14 @@ impl Targets {
         };
         film.keep(self.written);
         let film = &*film;
-        match &self.picture {
-            Some((path, form)) => {
-                match (path, form, encoded) {
-                    (Some(path), Form::Png, Some(map)) => write_png(path, map.width, map.height, &map.rgb)?,
-                    (Some(path), Form::Npy, _) => write_npy(path, film, LayerKind::Color)?,
-                    (Some(path), _, _) => write_exr(path, film)?,
-                    (None, _, encoded) => write_to_stdout(encoded)?,
-                }
-                files.extend(path.clone());
+        if let Some((path, form)) = &self.picture {
+            match (path, form, encoded) {
+                (Some(path), Form::Png, Some(map)) => write_png(path, map.width, map.height, &map.rgb)?,
+                (Some(path), Form::Npy, _) => write_npy(path, film, LayerKind::Color)?,
+                (Some(path), _, _) => write_exr(path, film)?,
+                (None, _, encoded) => write_to_stdout(encoded)?,
             }
-            None => {}
+            files.extend(path.clone());
         }
         if let Some(folder) = &self.arrays {
             std::fs::create_dir_all(folder).map_err(|source| Error::Write {

@@ -22,11 +22,7 @@ use crate::view::View;
 /// Renders, writes and tells what it cost.
 pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let start = Instant::now();
-    let tone = &args.picture.tone;
-    let targets = match args.shard {
-        Some(shard) => Targets::of_part(&args.target, shard, tone, args.run.json),
-        None => Targets::new(&args.target, tone, args.run.json),
-    }?;
+    let targets = targets(args)?;
     let level = machine::simd_level(args.run.simd.as_deref())?;
     machine::start_threads(args.run.threads)?;
     let options = RenderOptions {
@@ -108,6 +104,15 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     } else {
         report::note(&summary.text());
         Ok(())
+    }
+}
+
+/// Where the picture, or the part of it, goes.
+fn targets(args: &RenderArgs) -> Result<Targets, Failure> {
+    let (target, tone, json) = (&args.target, &args.picture.tone, args.run.json);
+    match args.shard {
+        Some(shard) => Targets::of_part(target, shard, tone, json),
+        None => Targets::new(target, tone, json),
     }
 }
 

@@ -99,8 +99,8 @@ impl<'g> FrameStructures<'g> {
         // It knows of no triangles that cast by one side alone.
         let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
         let costs = options.layers.cost;
-        let general = (through || plan.secondary || shadows || costs || !geometry.solids.is_empty())
-            .then(|| general(triangles, options, builder, &mut stats));
+        let any = through || plan.secondary || shadows || costs || !geometry.solids.is_empty();
+        let general = any.then(|| general(triangles, options, builder, &mut stats));
         let asked = general.as_deref().filter(|_| shadows);
 
         let mut scratch = LitScratch::default();
@@ -116,11 +116,7 @@ impl<'g> FrameStructures<'g> {
                 light_veils.push(None);
                 continue;
             }
-            let name = if plan.name.is_empty() {
-                i.to_string()
-            } else {
-                format!("{:?}", plan.name)
-            };
+            let name = name_of(plan, i);
             let start = Instant::now();
             let shadows = shadows_of(
                 plan,
@@ -151,10 +147,7 @@ impl<'g> FrameStructures<'g> {
                 |veils| [veils.bytes(), veils.cell_count(), veils.reference_count()],
             )
         });
-        let measured = general.clone().filter(|_| costs).map(|any| Measured {
-            any,
-            lights: light_grids(plan, geometry, rules, options),
-        });
+        let measured = measured(general.clone(), plan, geometry, rules, options);
         Self {
             eye,
             visibility,
@@ -277,6 +270,15 @@ fn eye_grid<'g>(
     EyeGrid::build_of(view, triangles, opaque, plan.eye, level)
 }
 
+/// What a light is called: its own name, or its number.
+fn name_of(plan: &LightPlan, number: usize) -> String {
+    if plan.name.is_empty() {
+        number.to_string()
+    } else {
+        format!("{:?}", plan.name)
+    }
+}
+
 /// Traces the tiles that are to be rendered.
 fn look_around(eye: &EyeGrid, options: &RenderOptions) -> Visibility {
     Visibility::trace_some(eye, &|tile| options.renders(tile), &|_, _| ())
@@ -321,19 +323,22 @@ fn veils_before<'g>(
     PointLightGrid::build(plan.light, triangles(geometry), &rule, plan.grid, level)
 }
 
-/// The grids of all lights without a size, over all that casts.
-fn light_grids<'g>(
+/// What is asked of again where costs are to be told, with the grids of all lights without a size.
+fn measured<'g>(
+    general: Option<Arc<dyn SecondaryTracer + 'g>>,
     plan: &FramePlan,
     geometry: &'g FrameGeometry,
     rules: &CasterRules<'g>,
     options: &RenderOptions,
-) -> Vec<PointLightGrid<'g>> {
+) -> Option<Measured<'g>> {
+    let any = general.filter(|_| options.layers.cost)?;
     let points = plan.lights.iter().flatten().filter(|plan| plan.area.is_none());
     let grid = |plan: &LightPlan| {
         let rule = rules.for_light(geometry, &plan.light);
         PointLightGrid::build(plan.light, triangles(geometry), &rule, plan.grid, options.level)
     };
-    points.map(grid).collect()
+    let lights = points.map(grid).collect();
+    Some(Measured { any, lights })
 }
 
 /// Builds what tells the shadows of one light.

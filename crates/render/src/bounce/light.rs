@@ -1,5 +1,9 @@
 //! The light of surfaces that paths have come to: from lights, and from an environment.
 //!
+//! A light without a size, seen by a mirror that a rough lobe found by chance, would be a rare and very bright dot in the
+//! picture. Such mirrors are lit as if they were rougher ([`SOFTENED`]), so their caustics are blurred (path-space
+//! regularisation, Kaplanyan and Dachsbacher 2013).
+//!
 //! Shadows are asked of the general structure, both sides of all triangles casting: the rule by which back faces
 //! alone may cast is one about what the eye sees.
 //!
@@ -21,13 +25,29 @@ use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
 
+/// Least roughness of surfaces lit after a rough lobe.
+const SOFTENED: f32 = 0.4;
+
+/// An arrival's surface as it is lit.
+fn lit_surface(arrival: &Arrival) -> Surface {
+    let surface = arrival.surface;
+    if arrival.sharp > 0.0 {
+        return surface;
+    }
+    Surface {
+        roughness: surface.roughness.max(SOFTENED),
+        ..surface
+    }
+}
+
 impl TileShader<'_> {
     /// Adds the light of all sources to the arrivals that they reach.
     pub(crate) fn illuminate_arrivals(&self, tracer: &dyn SecondaryTracer, work: &mut BounceWork) {
         for (index, (light, end)) in self.lights.iter().zip(self.ends).enumerate() {
             for arrival in &mut work.arrivals {
+                let surface = lit_surface(arrival);
                 let Some(plan) = end else {
-                    if let Some(incident) = direct(&arrival.surface, light) {
+                    if let Some(incident) = direct(&surface, light) {
                         arrival.color += incident.radiance;
                     }
                     continue;
@@ -35,7 +55,7 @@ impl TileShader<'_> {
                 if let Some(area) = &plan.area {
                     let (light, filters) = ((index, light, area), &mut work.filters);
                     arrival.color += self.soft_light(tracer, arrival, light, filters, &mut work.shadow_rays);
-                } else if let Some(incident) = direct(&arrival.surface, light)
+                } else if let Some(incident) = direct(&surface, light)
                     && self.is_turned_to(&plan.light, arrival)
                 {
                     work.shadow_rays += 1;
@@ -56,9 +76,7 @@ impl TileShader<'_> {
         filters: &mut Vec<u32>,
         asked: &mut u64,
     ) -> Vec3 {
-        let Arrival {
-            surface, receiver, ..
-        } = arrival;
+        let (surface, receiver) = (&lit_surface(arrival), &arrival.receiver);
         if surface.unlit || !area.shines_at(receiver.point) {
             return Vec3::ZERO;
         }
