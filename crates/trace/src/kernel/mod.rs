@@ -11,6 +11,7 @@ pub(crate) mod area;
 pub(crate) mod batch;
 pub(crate) mod bundles;
 pub(crate) mod casters;
+pub(crate) mod cells;
 pub(crate) mod cluster;
 pub(crate) mod cover;
 pub(crate) mod edges;
