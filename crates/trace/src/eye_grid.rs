@@ -104,6 +104,8 @@ pub struct TileHits {
     buffer: TileBuffer,
     work: TileWork,
     singles: Singles,
+    /// Triangles that were told of, see [`EyeGrid::trace_tile_passes`].
+    told: Vec<[u32; LANES]>,
     /// Pairs of pixel and triangle settled by the exact decision in the last tile.
     pub exact_pixels: usize,
     /// Totals of all tiles traced with this memory.
@@ -520,5 +522,6 @@ pub(crate) fn project_all(level: SimdLevel, view: &View, triangles: &Triangles) 
 }
 
 mod lists;
+mod passes;
 #[cfg(test)]
 mod tests;

@@ -5,6 +5,7 @@
 //! | eye rays of one camera | [`EyeGrid`] | HM08 §5.1 |
 //! | hard shadow rays of one light, from all that the eye sees | [`LitPixels`] | HM08 §5.2, turned round |
 //! | hard shadow rays of one light, from any points | [`PointLightGrid`] | HM08 §5.2 |
+//! | the same where casters are of many sizes | [`PointLightTree`] | HM08 §5.2, in a hierarchy |
 //! | rays that nearly share an origin, and any other | [`PerspectiveGrids`] | HM08 §5.3 |
 //! | the same at any time of a shutter | [`MovingGrids`] | HM08 §5.1 |
 //! | soft shadow rays of one light | [`AreaLightTree`] | HM08 §5.3, in a hierarchy |
@@ -41,7 +42,9 @@ mod facets;
 mod grid3;
 mod kernel;
 pub mod ldc;
+mod light_costs;
 mod light_grid;
+mod light_tree;
 mod light_views;
 mod moving;
 mod perspective_grids;
@@ -76,10 +79,12 @@ pub use grid3::{Grid3, RaySpan};
 pub use kernel::SimdLevel;
 pub use kernel::tile::BlockPixels;
 pub use ldc::{Ldc, LdcOptions};
+pub use light_costs::ShadowCosts;
 pub use light_grid::{
     CastRule, Casts, Cone, LightCell, LightGridOptions, MAX_RESOLUTION, PointLightGrid, ShadowCounts,
     ShadowScratch,
 };
+pub use light_tree::{PointLightTree, TreeSteps};
 pub use moving::{MovingAt, MovingGrids, MovingTriangles, Vertices};
 pub use perspective_grids::PerspectiveGrids;
 pub use queries::Candidates;

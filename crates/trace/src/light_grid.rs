@@ -14,12 +14,15 @@
 //! leaves it again before it reaches the light. Elsewhere both sides cast. The caller says which, see
 //! [`Casts`].
 //!
-//! Limits: where coordinates pass 1e30 every caster is tested for every receiver.
+//! Limits: where coordinates pass 1e30, or all of the geometry is smaller than 1e-27, every caster is tested for every
+//! receiver.
 //!
 //! Layout: 16 bytes a vertex while building; 72 bytes a caster, 4 bytes a reference, 4 bytes a cell and 4 more
 //! for each chunk of triangles. Rebuilt every
 //! frame. Answers: exactly those of [`crate::BruteForce`], see [`crate::exact`].
 
+mod nearest;
+mod sheets;
 mod veils;
 
 use glam::{DVec3, Vec3};
@@ -29,16 +32,20 @@ use crate::bins::{Binning, Bins, CellGrid};
 use crate::exact;
 use crate::eye_grid::project_all;
 use crate::kernel::edges::{EdgeLanes, EdgeRecord, VertexLanes};
+use crate::kernel::light_tree::Walk;
 use crate::kernel::points::{Caster, PointLanes, set_up_casters, shadowed};
 use crate::kernel::project::RasterVertex;
 use crate::kernel::veils::Veiled;
-use crate::kernel::{LANES, NEARNESS_BAND, SimdLevel};
+use crate::kernel::{LANES, SimdLevel};
+use crate::light_costs::Extents;
 use crate::precise::PreciseTriangle;
 use crate::view::View;
-use crate::{Light, Receiver, Triangles};
+use crate::{Light, Receiver, Topology, Triangles};
+use nearest::nearest_per_cell;
+use sheets::Sheets;
 
 /// Parameters of a [`PointLightGrid`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightGridOptions {
     /// Cells in each direction of a face, at most [`MAX_RESOLUTION`]; `None` chooses by number and size of the
     /// triangles.
@@ -47,6 +54,19 @@ pub struct LightGridOptions {
     pub binning: Binning,
     /// Only receivers within this cone are asked about; one face then serves a light anywhere.
     pub cone: Option<Cone>,
+    /// How many receivers are expected to ask: what a build may cost follows from it.
+    pub receivers: u64,
+}
+
+impl Default for LightGridOptions {
+    fn default() -> Self {
+        Self {
+            resolution: None,
+            binning: Binning::Overlap,
+            cone: None,
+            receivers: 1_000_000,
+        }
+    }
 }
 
 impl LightGridOptions {
@@ -55,7 +75,7 @@ impl LightGridOptions {
         Self {
             resolution: Some(200),
             binning: Binning::Rectangle,
-            cone: None,
+            ..Self::default()
         }
     }
 }
@@ -91,7 +111,7 @@ pub struct PointLightGrid<'a> {
     triangles: Triangles<'a>,
     level: SimdLevel,
     faces: Vec<Face>,
-    /// Casters to be tested one by one, where the geometry is too large to be projected.
+    /// Casters to be tested one by one, where the geometry is too large or too small to be projected.
     unprojected: Vec<u32>,
 }
 
@@ -102,6 +122,8 @@ struct Face {
     casters: Vec<Caster>,
     /// Per cell, a nearness that no caster in it exceeds.
     nearest: Vec<f32>,
+    /// Per cell, a nearness below which everything is in shadow; empty if that was not looked for.
+    dark: Vec<f32>,
 }
 
 /// What became of the receivers asked about.
@@ -109,10 +131,16 @@ struct Face {
 pub struct ShadowCounts {
     /// Receivers.
     pub receivers: u64,
-    /// Those lit by their cell's bound, without a test.
+    /// Those lit by their cell's bound, or in no caster's box of a tree: without a test.
     pub lit_by_cell: u64,
+    /// Those in shadow as casters cover their cell whole, without a test.
+    pub dark_by_cell: u64,
     /// Pairs of receiver and triangle decided exactly.
     pub exact_pairs: u64,
+    /// Nodes of a tree entered, once for each receiver.
+    pub nodes: u64,
+    /// Triangles of a tree in whose box a receiver lies, once for each receiver.
+    pub tests: u64,
 }
 
 /// What a cell has for a receiver in it.
@@ -120,7 +148,7 @@ pub struct ShadowCounts {
 pub struct LightCell {
     /// Casters that it lists.
     pub casters: usize,
-    /// Whether the receiver lies before all of them by the cell's bound, and is lit without a test.
+    /// Whether the cell decides without a test: the receiver lies before all of them, or behind some that cover the cell.
     pub spared: bool,
 }
 
@@ -129,7 +157,8 @@ pub struct LightCell {
 pub struct ShadowScratch {
     pending: Vec<Pending>,
     unsure: Vec<(u32, u32)>,
-    points: PointLanes,
+    pub(crate) points: PointLanes,
+    pub(crate) walk: Walk,
     veils: Vec<Veiled>,
     /// Totals of all queries made with this memory.
     pub counts: ShadowCounts,
@@ -152,6 +181,33 @@ impl<'a> PointLightGrid<'a> {
         options: LightGridOptions,
         level: SimdLevel,
     ) -> Self {
+        Self::build_over(light, (triangles, None), rule, options, level)
+    }
+
+    /// As [`Self::build`], over triangles of which is known how they hang together: cells that they cover whole then decide
+    /// what is dark, where there are few references for the receivers. It changes no answer about receivers on triangles.
+    ///
+    /// # Panics
+    /// If the topology is not that of as many triangles.
+    pub fn build_with_topology(
+        light: Light,
+        triangles: Triangles<'a>,
+        topology: &Topology,
+        rule: CastRule,
+        options: LightGridOptions,
+        level: SimdLevel,
+    ) -> Self {
+        assert_eq!(topology.neighbours().len(), triangles.len(), "of these triangles");
+        Self::build_over(light, (triangles, Some(topology)), rule, options, level)
+    }
+
+    fn build_over(
+        light: Light,
+        (triangles, topology): (Triangles<'a>, Option<&Topology>),
+        rule: CastRule,
+        options: LightGridOptions,
+        level: SimdLevel,
+    ) -> Self {
         let mut grid = Self {
             light,
             triangles,
@@ -160,7 +216,9 @@ impl<'a> PointLightGrid<'a> {
             unprojected: Vec::new(),
         };
         if let Some(faces) = crate::light_views::views(&light, &triangles, options.cone, None) {
-            let face = |view| Face::build(view, &light, &triangles, rule, &options, level);
+            let keep = |prim: u32| takes_part(&light, &triangles, rule(prim), prim);
+            let over = (&triangles, topology);
+            let face = |view| Face::build(view, over, &keep, &options, level);
             grid.faces = faces.views.into_iter().map(face).collect();
         } else {
             let prims = 0..triangles.len() as u32;
@@ -188,8 +246,10 @@ impl<'a> PointLightGrid<'a> {
 
     /// Bytes held by the grid.
     pub fn bytes(&self) -> usize {
-        let face =
-            |f: &Face| f.bins.bytes() + f.casters.capacity() * size_of::<Caster>() + f.nearest.capacity() * 4;
+        let face = |f: &Face| {
+            let cells = (f.nearest.capacity() + f.dark.capacity()) * 4;
+            f.bins.bytes() + f.casters.capacity() * size_of::<Caster>() + cells
+        };
         self.faces.iter().map(face).sum()
     }
 
@@ -206,7 +266,7 @@ impl<'a> PointLightGrid<'a> {
             }
             return;
         }
-        self.sort_into_cells(receivers, scratch);
+        self.sort_into_cells(receivers, scratch, |i| shadow[i] = true);
         let pending = std::mem::take(&mut scratch.pending);
         for same_cell in pending.chunk_by(|a, b| (a.face, a.cell) == (b.face, b.cell)) {
             for batch in same_cell.chunks(LANES) {
@@ -218,27 +278,39 @@ impl<'a> PointLightGrid<'a> {
 
     /// What the cell that a receiver lies in holds; `None` if no caster can be before the receiver.
     pub fn cell_of(&self, receiver: &Receiver) -> Option<LightCell> {
-        let (face, raster) = self.locate(receiver.point)?;
+        let (face, raster) = locate(self.faces.iter().map(|face| &face.view), receiver.point)?;
         let face = &self.faces[face];
         let cell = face.cell(raster[0], raster[1]);
         Some(LightCell {
             casters: face.bins.cell(cell).map(<[u32]>::len).sum(),
-            spared: raster[2] >= face.nearest[cell],
+            spared: raster[2] >= face.nearest[cell] || face.hides(cell, raster),
         })
     }
 
-    /// Leaves in `scratch.pending` the receivers that their cell does not decide, ordered by cell.
-    fn sort_into_cells(&self, receivers: &[Receiver], scratch: &mut ShadowScratch) {
+    /// Leaves in `scratch.pending` the receivers that their cell does not decide, ordered by cell; tells of those that it
+    /// finds dark.
+    fn sort_into_cells(
+        &self,
+        receivers: &[Receiver],
+        scratch: &mut ShadowScratch,
+        mut is_dark: impl FnMut(usize),
+    ) {
         scratch.pending.clear();
         scratch.counts.receivers += receivers.len() as u64;
         for (i, receiver) in receivers.iter().enumerate() {
-            let Some((face, raster)) = self.locate(receiver.point) else {
+            let views = self.faces.iter().map(|face| &face.view);
+            let Some((face, raster)) = locate(views, receiver.point) else {
                 continue;
             };
             let f = &self.faces[face];
             let cell = f.cell(raster[0], raster[1]);
             if raster[2] >= f.nearest[cell] {
                 scratch.counts.lit_by_cell += 1;
+                continue;
+            }
+            if f.hides(cell, raster) {
+                scratch.counts.dark_by_cell += 1;
+                is_dark(i);
                 continue;
             }
             let (face, cell) = (face as u32, cell as u32);
@@ -252,28 +324,6 @@ impl<'a> PointLightGrid<'a> {
         scratch
             .pending
             .sort_unstable_by_key(|p| (p.face, p.cell, p.receiver));
-    }
-
-    /// The face a point lies in with its raster coordinates and nearness; `None` if no caster can be before it.
-    fn locate(&self, point: DVec3) -> Option<(usize, [f32; 3])> {
-        let depth = |face: &Face| (point - face.view.center.as_dvec3()).dot(face.view.forward);
-        // Of a cube's faces the one whose axis is closest; a single face is its own maximum.
-        let best = |best: (usize, f64), next: (usize, f64)| if next.1 > best.1 { next } else { best };
-        let (face, along) = self.faces.iter().map(depth).enumerate().reduce(best)?;
-        if !(along > 0.0 && point.is_finite()) {
-            return None;
-        }
-        let view = &self.faces[face].view;
-        let h = view.homogeneous(point);
-        let inverse = 1.0 / h.p.z;
-        let raster = [
-            (h.p.x * inverse) as f32,
-            (h.p.y * inverse) as f32,
-            (h.m * inverse) as f32,
-        ];
-        let within = |v: f32, size: u32| v >= -1.0 && v <= size as f32 + 1.0;
-        let seen = within(raster[0], view.width) && within(raster[1], view.height);
-        seen.then_some((face, raster))
     }
 
     fn test_batch(
@@ -328,20 +378,22 @@ impl<'a> PointLightGrid<'a> {
 impl Face {
     fn build(
         view: View,
-        light: &Light,
-        triangles: &Triangles,
-        rule: CastRule,
+        (triangles, topology): (&Triangles, Option<&Topology>),
+        keep: &(dyn Fn(u32) -> bool + Sync),
         options: &LightGridOptions,
         level: SimdLevel,
     ) -> Self {
-        let keep = |prim: u32| takes_part(light, triangles, rule(prim), prim);
         let raster = |resolution: u32| {
             let size = [f64::from(view.width), f64::from(view.height)];
             view.window([0.0; 2], size, [resolution; 2])
         };
         let resolution = options.resolution.unwrap_or_else(|| {
             let coarse = raster(SURVEY_RESOLUTION);
-            survey(&project_all(level, &coarse, triangles), triangles)
+            survey(
+                &project_all(level, &coarse, triangles),
+                triangles,
+                options.receivers,
+            )
         });
         let view = raster(resolution.clamp(1, MAX_RESOLUTION));
         let grid = CellGrid {
@@ -355,12 +407,30 @@ impl Face {
         let prims = bins.number_references(triangles.len());
         let casters = set_up_all(level, &view, triangles, &vertices, &prims);
         let nearest = nearest_per_cell(&view, triangles, &vertices, &bins, &prims, &casters);
+        let few = bins.reference_count() as u64 * RECEIVERS_A_REFERENCE <= options.receivers;
+        let dark = topology.filter(|_| few).map_or_else(Vec::new, |topology| {
+            let sheets = Sheets::new(triangles, &vertices, (&prims, &casters), topology);
+            sheets.dark_per_cell(&view, &bins)
+        });
         Self {
             view,
             bins,
             casters,
             nearest,
+            dark,
         }
+    }
+
+    /// Whether what covers a point's cell whole lies before it.
+    #[inline]
+    fn hides(&self, cell: usize, raster: [f32; 3]) -> bool {
+        self.dark.get(cell).is_some_and(|&dark| raster[2] < dark) && self.shows(raster)
+    }
+
+    /// Whether a raster point lies within the raster, and not only next to it.
+    #[inline]
+    fn shows(&self, [x, y, _]: [f32; 3]) -> bool {
+        x >= 0.0 && y >= 0.0 && x <= self.view.width as f32 && y <= self.view.height as f32
     }
 
     /// Cell of a raster point; points a little outside belong to the border.
@@ -372,59 +442,59 @@ impl Face {
     }
 }
 
+/// Of a light's faces the one a point lies in, with its raster coordinates and nearness; `None` if no caster can be before
+/// it.
+#[inline]
+pub(crate) fn locate<'v>(
+    views: impl Iterator<Item = &'v View> + Clone,
+    point: DVec3,
+) -> Option<(usize, [f32; 3])> {
+    let depth = |view: &View| (point - view.center.as_dvec3()).dot(view.forward);
+    // Of a cube's faces the one whose axis is closest; a single face is its own maximum.
+    let best = |best: (usize, f64), next: (usize, f64)| if next.1 > best.1 { next } else { best };
+    let (face, along) = views.clone().map(depth).enumerate().reduce(best)?;
+    if !(along > 0.0 && point.is_finite()) {
+        return None;
+    }
+    let view = views.clone().nth(face)?;
+    let h = view.homogeneous(point);
+    let inverse = 1.0 / h.p.z;
+    let raster = [
+        (h.p.x * inverse) as f32,
+        (h.p.y * inverse) as f32,
+        (h.m * inverse) as f32,
+    ];
+    let within = |v: f32, size: u32| v >= -1.0 && v <= size as f32 + 1.0;
+    let seen = within(raster[0], view.width) && within(raster[1], view.height);
+    seen.then_some((face, raster))
+}
+
 /// Largest number of cells in each direction of a face.
 pub const MAX_RESOLUTION: u32 = 2048;
 
 /// Raster on which casters are measured before the resolution is chosen.
 const SURVEY_RESOLUTION: u32 = 256;
 
+/// To look at one reference for what a cell hides whole costs about as much as is saved for a receiver; so many receivers
+/// have to be asking for each that it pays, for one in some eight is found dark.
+const RECEIVERS_A_REFERENCE: u64 = 8;
+
 /// Triangles measured to choose a resolution; more would not change it.
 const SURVEY_TRIANGLES: usize = 16 * 1024;
 
-/// Chooses the resolution at which building a face and asking it cost the least together.
-///
-/// A grid of N x N cells holds n + P N + A N^2 references for n triangles whose rectangles have the half
-/// perimeters P and areas A in units of the face. A reference costs some 4 ns to build and is tested once for
-/// every batch of receivers that share its cell: at least once, and for all batches together as often as a
-/// cell has references.
-fn survey(vertices: &[RasterVertex], triangles: &Triangles) -> u32 {
-    const RECEIVERS: f64 = 1e6;
-    const PER_REFERENCE: f64 = 12.0;
-    const PER_CELL: f64 = 3.0;
-    const PER_RECEIVER_AND_REFERENCE: f64 = 0.7;
+/// Measures casters on the raster of [`SURVEY_RESOLUTION`] to choose the resolution of a face.
+fn survey(vertices: &[RasterVertex], triangles: &Triangles, receivers: u64) -> u32 {
     let unit = SURVEY_RESOLUTION as f32;
     let step = (triangles.len() / SURVEY_TRIANGLES).max(1);
-    let (mut count, mut perimeter, mut area) = (0.0, 0.0, 0.0);
+    let mut extents = Extents::default();
     for indices in triangles.indices.iter().step_by(step) {
         let [a, b, c] = indices.map(|i| &vertices[i as usize]);
-        if !(a.nearness >= 0.0 && b.nearness >= 0.0 && c.nearness >= 0.0) {
-            continue;
-        }
-        let extent = |v: [f32; 3]| {
-            let low = v[0].min(v[1]).min(v[2]).max(0.0);
-            let high = v[0].max(v[1]).max(v[2]).min(unit);
-            f64::from((high - low) / unit)
-        };
-        let (w, h) = (extent([a.x, b.x, c.x]), extent([a.y, b.y, c.y]));
-        if w >= 0.0 && h >= 0.0 {
-            count += step as f64;
-            perimeter += (w + h) * step as f64;
-            // Half of the rectangle: larger triangles are put only where their edges reach.
-            area += 0.5 * w * h * step as f64;
+        if a.nearness >= 0.0 && b.nearness >= 0.0 && c.nearness >= 0.0 {
+            let [x, y] = [[a.x, b.x, c.x], [a.y, b.y, c.y]];
+            extents.add([x.map(|v| v / unit), y.map(|v| v / unit)], step as f64);
         }
     }
-    let cost = |resolution: u32| {
-        let n = f64::from(resolution);
-        let references = count + perimeter * n + area * n * n;
-        references * PER_REFERENCE
-            + n * n * PER_CELL
-            + RECEIVERS * PER_RECEIVER_AND_REFERENCE * references / (n * n)
-    };
-    let candidates = [32, 64, 96, 128, 192, 256, 384, 512, 768, 1024];
-    candidates
-        .into_iter()
-        .min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
-        .unwrap_or(32)
+    extents.resolution(receivers as f64)
 }
 
 /// Whether a triangle is put into the grid.
@@ -498,87 +568,6 @@ fn precise_caster(view: &View, corners: [Vec3; 3], prim: u32) -> Caster {
         record,
         origin: origin.map(|v| v as f32),
     }
-}
-
-/// For every cell the bound on its casters' nearness: of each the smaller of its largest vertex and its plane's
-/// largest value over the cell's corners.
-fn nearest_per_cell(
-    view: &View,
-    triangles: &Triangles,
-    vertices: &[RasterVertex],
-    bins: &Bins,
-    prims: &[u32],
-    casters: &[Caster],
-) -> Vec<f32> {
-    let columns = view.width as usize;
-    // Casters not larger than a cell are bounded by their nearest vertex; the others, marked by a bound below 0,
-    // by their plane as well.
-    let bounds: Vec<f32> = prims
-        .par_iter()
-        .map(|&prim| {
-            let [a, b, c] = triangles.indices[prim as usize].map(|i| &vertices[i as usize]);
-            let extent = |v: [f32; 3]| v[0].max(v[1]).max(v[2]) - v[0].min(v[1]).min(v[2]);
-            let small = extent([a.x, b.x, c.x]) <= 1.0 && extent([a.y, b.y, c.y]) <= 1.0;
-            let usable = a.nearness > 0.0 && b.nearness > 0.0 && c.nearness > 0.0;
-            let largest = a.nearness.max(b.nearness).max(c.nearness) * (1.0 + NEARNESS_BAND);
-            if small && usable { largest } else { -1.0 }
-        })
-        .collect();
-    let mut nearest = vec![0.0f32; columns * view.height as usize];
-    nearest
-        .par_chunks_mut(columns)
-        .enumerate()
-        .for_each(|(row, nearest)| {
-            for (column, nearest) in nearest.iter_mut().enumerate() {
-                let corner = [column as f32, row as f32];
-                for &r in bins.cell(row * columns + column).flatten() {
-                    let mut bound = bounds[r as usize];
-                    if bound < 0.0 {
-                        let corners =
-                            triangles.indices[prims[r as usize] as usize].map(|i| &vertices[i as usize]);
-                        bound = nearness_bound(&casters[r as usize], corners, corner);
-                    }
-                    *nearest = nearest.max(bound);
-                }
-            }
-        });
-    nearest
-}
-
-#[inline]
-fn nearness_bound(caster: &Caster, corners: [&RasterVertex; 3], cell: [f32; 2]) -> f32 {
-    let Caster { record, origin } = caster;
-    let vertex_bound = if corners.iter().all(|v| v.nearness > 0.0) {
-        corners[0]
-            .nearness
-            .max(corners[1].nearness)
-            .max(corners[2].nearness)
-    } else {
-        f32::INFINITY
-    };
-    // Points belong to a cell by clamping too, so the cell is taken a little larger. A plane is known to its
-    // error only within its triangle's rectangle, and only there it matters.
-    let [a, b, c] = corners;
-    let range = |axis: usize, v: [f32; 3]| {
-        let (low, high) = (cell[axis] - 0.01, cell[axis] + 1.01);
-        if vertex_bound.is_finite() {
-            (
-                low.max(v[0].min(v[1]).min(v[2])),
-                high.min(v[0].max(v[1]).max(v[2])),
-            )
-        } else {
-            (low, high)
-        }
-    };
-    let largest = |g: f32, (low, high): (f32, f32), axis: usize| {
-        let (low, high) = (low - origin[axis], high - origin[axis]);
-        ((g * low).max(g * high), g.abs() * low.abs().max(high.abs()))
-    };
-    let (x, x_size) = largest(record.nearness_x, range(0, [a.x, b.x, c.x]), 0);
-    let (y, y_size) = largest(record.nearness_y, range(1, [a.y, b.y, c.y]), 1);
-    let rounding = (record.nearness.abs() + x_size + y_size) * 1e-6;
-    let plane_bound = (record.nearness + x + y).max(record.floor) + rounding;
-    vertex_bound.min(plane_bound) * (1.0 + NEARNESS_BAND)
 }
 
 #[cfg(test)]

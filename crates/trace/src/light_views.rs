@@ -30,11 +30,14 @@ const CUBE_FACES: [[DVec3; 3]; 6] = [
 /// Coordinates beyond this are not projected: a few products of them leave the range of f32.
 const LARGEST: f64 = 1e30;
 
+/// Geometry smaller than this is not projected: in its raster nearness, 1 / depth, leaves the range of f32.
+const SMALLEST: f64 = 1e-27;
+
 /// A wider cone than this, in radians, is served like a light without one.
 const WIDEST_CONE: f64 = 1.5;
 
 /// The views of a light onto these triangles; none where there is nothing to see, or where the light has no
-/// finite position or direction. `None` if the geometry is too large to be projected. `extent` is a box around all
+/// finite position or direction. `None` if the geometry is too large or too small to be projected. `extent` is a box around all
 /// triangles, if one is known that is finite.
 pub(crate) fn views(
     light: &Light,
@@ -45,7 +48,8 @@ pub(crate) fn views(
     let Some(bounds) = extent.map_or_else(|| Bounds::of(triangles), |b| Some(Bounds::enlarged(b))) else {
         return Some(LightFaces::default());
     };
-    if bounds.min.abs().max(bounds.max.abs()).max_element() > LARGEST {
+    let size = (bounds.max - bounds.min).max_element();
+    if bounds.min.abs().max(bounds.max.abs()).max_element() > LARGEST || size < SMALLEST {
         return None;
     }
     let mut cube = None;

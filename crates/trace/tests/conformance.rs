@@ -6,8 +6,9 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use rayward_trace::ldc::{DepthFormat, Hierarchy};
 use rayward_trace::{
-    Accel, BruteForce, Bvh, Candidates, Counters, FaceOptions, Grid3, Hit, Ldc, LdcOptions, Light,
-    PerspectiveGrids, Ray, Receiver, SurfaceRay, Topology, Triangles,
+    Accel, BruteForce, Bvh, Candidates, Casts, Counters, FaceOptions, Grid3, Hit, Ldc, LdcOptions, Light,
+    LightGridOptions, PerspectiveGrids, PointLightGrid, PointLightTree, Ray, Receiver, ShadowScratch,
+    SimdLevel, SurfaceRay, Topology, Triangles,
 };
 use support::meshes::{self, Mesh};
 use support::{Random, rays};
@@ -217,6 +218,42 @@ fn all_structures_cast_the_same_shadows() {
             }
         }
     }
+}
+
+#[test]
+fn structures_of_lights_cast_the_same_shadows() {
+    let level = SimdLevel::detect();
+    let (mut decided, mut asked) = (0, 0);
+    for (k, mesh) in meshes::table().iter().enumerate() {
+        let seed = 1300 + k as u64;
+        let triangles = mesh.triangles();
+        let brute = BruteForce::new(triangles);
+        let topology = Topology::analyse(&triangles);
+        let receivers = receivers(mesh, seed, 80);
+        for light in lights(mesh, &mut Random::new(seed)) {
+            let both = |_| Casts::Both;
+            let options = LightGridOptions::default();
+            let grid =
+                PointLightGrid::build_with_topology(light, triangles, &topology, &both, options, level);
+            let tree = PointLightTree::build(light, triangles, &both, None, level);
+            let mut scratch = ShadowScratch::default();
+            let (mut by_grid, mut by_tree) = (Vec::new(), Vec::new());
+            grid.shadowed(&receivers, &mut scratch, &mut by_grid);
+            decided += scratch.counts.dark_by_cell;
+            tree.shadowed(&receivers, &mut scratch, &mut by_tree);
+            asked += scratch.counts.receivers;
+            for (i, receiver) in receivers.iter().enumerate() {
+                let truth = brute.shadowed(receiver, &light);
+                let place = || format!("{}, seed {seed}: {receiver:?} {light:?}", mesh.name);
+                assert_eq!(by_grid[i], truth, "grid, {}", place());
+                assert_eq!(by_tree[i], truth, "tree, {}", place());
+            }
+        }
+    }
+    assert!(
+        decided > 20 && asked > 10_000,
+        "{decided} of {asked} dark by cell"
+    );
 }
 
 #[test]

@@ -366,3 +366,52 @@ fn equals_brute_force_with_a_triangle_of_any_size_in_view() {
         check(&format!("huge {huge:e}"), &mesh, view);
     }
 }
+
+#[test]
+fn passes_come_nearer_and_end_with_what_is_seen() {
+    let view = looking(Vec3::new(2.0, 1.0, 3.0), Vec3::ZERO, 0.5, [97, 61]);
+    for mesh in [Mesh::soup(1, 300, 0.3, 1.0), Mesh::awkward()] {
+        let triangles = mesh.triangles();
+        let clusters = Clusters::new(&triangles);
+        for (options, clustered) in arrangements() {
+            let level = SimdLevel::detect();
+            let grid = if clustered {
+                EyeGrid::build_clustered(view, triangles, &clusters, options, level)
+            } else {
+                EyeGrid::build(view, triangles, options, level)
+            };
+            let (mut hits, mut seen, mut passes) = (TileHits::default(), 0, 0);
+            for index in 0..grid.tile_count() {
+                let tile = grid.tile(index);
+                let mut last = vec![None; (tile.width * tile.height) as usize];
+                grid.trace_tile_passes(&tile, &mut hits, |x, y, prim| {
+                    let before = last[(y * tile.width + x) as usize].replace(prim);
+                    let ray = view.pixel_ray(tile.x + x, tile.y + y);
+                    let t = |prim| {
+                        exact::hit(ray.origin, ray.dir, triangles.corners(prim))
+                            .expect("a hit")
+                            .t
+                    };
+                    let nearer = before.is_none_or(|before| (t(prim), prim) < (t(before), before));
+                    assert!(nearer, "{before:?} before {prim}, {options:?}");
+                    passes += 1;
+                });
+                for (x, y) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (x, y))) {
+                    let got = last[(y * tile.width + x) as usize];
+                    assert_eq!(got, hits.prim(x, y), "{options:?}, clusters {clustered}");
+                    seen += usize::from(got.is_some());
+                }
+            }
+            // Object order finds farther ones first, and often.
+            let (least, most) = if clustered {
+                (seen, seen)
+            } else {
+                (seen + 1, seen * 10)
+            };
+            assert!(
+                passes >= least && passes <= most,
+                "{passes} passes for {seen} pixels"
+            );
+        }
+    }
+}

@@ -109,40 +109,52 @@ fn shadowed_impl<S: Simd>(
     refs: &[u32],
     unsure: &mut Vec<(u32, u32)>,
 ) -> u32 {
-    let splat = |v: f32| f32x16::splat(simd, v);
-    let x = f32x16::from_slice(simd, &points.x);
-    let y = f32x16::from_slice(simd, &points.y);
-    let nearness = f32x16::from_slice(simd, &points.nearness);
-    let nearer = splat(1.0 - NEARNESS_BAND);
+    let at = [
+        f32x16::from_slice(simd, &points.x),
+        f32x16::from_slice(simd, &points.y),
+        f32x16::from_slice(simd, &points.nearness),
+    ];
     for &r in refs {
-        let caster = &casters[r as usize];
-        let record = &caster.record;
-        let Some(Met {
-            inside,
-            nearness: n,
-            vague,
-            possible,
-        }) = met(simd, caster, [x, y, nearness])
-        else {
-            continue;
-        };
-        let mut candidates = possible.to_bitmask() as u32 & open;
-        if candidates == 0 {
-            continue;
-        }
-        let own = u32x16::from_slice(simd, &points.own).simd_eq(u32x16::splat(simd, record.prim));
-        candidates &= !(own.to_bitmask() as u32);
-        let sure = inside.simd_gt(splat(1.0)) & (n * nearer).simd_gt(nearness) & !vague;
-        let sure = sure.to_bitmask() as u32 & candidates;
-        open &= !sure;
-        let mut rest = candidates & !sure;
-        while rest != 0 {
-            unsure.push((rest.trailing_zeros(), record.prim));
-            rest &= rest - 1;
-        }
+        open = open_past(simd, &casters[r as usize], (at, &points.own), open, unsure);
         if open == 0 {
             break;
         }
     }
     open
+}
+
+/// Of the `open` points those that one caster does not certainly shadow; `unsure` as in [`shadowed`].
+#[inline(always)]
+pub(super) fn open_past<S: Simd>(
+    simd: S,
+    caster: &Caster,
+    (at, own): ([f32x16<S>; 3], &[u32; LANES]),
+    open: u32,
+    unsure: &mut Vec<(u32, u32)>,
+) -> u32 {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let prim = caster.record.prim;
+    let Some(Met {
+        inside,
+        nearness: n,
+        vague,
+        possible,
+    }) = met(simd, caster, at)
+    else {
+        return open;
+    };
+    let mut candidates = possible.to_bitmask() as u32 & open;
+    if candidates == 0 {
+        return open;
+    }
+    let own = u32x16::from_slice(simd, own).simd_eq(u32x16::splat(simd, prim));
+    candidates &= !(own.to_bitmask() as u32);
+    let sure = inside.simd_gt(splat(1.0)) & (n * splat(1.0 - NEARNESS_BAND)).simd_gt(at[2]) & !vague;
+    let sure = sure.to_bitmask() as u32 & candidates;
+    let mut rest = candidates & !sure;
+    while rest != 0 {
+        unsure.push((rest.trailing_zeros(), prim));
+        rest &= rest - 1;
+    }
+    open & !sure
 }

@@ -31,10 +31,36 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: Ca
         })
     };
     let expected: Vec<bool> = receivers.iter().map(in_shadow).collect();
-    let mut counts = ShadowCounts::default();
-    for level in SimdLevel::available() {
-        for options in [LightGridOptions::default(), LightGridOptions::paper()] {
-            let grid = PointLightGrid::build(light, triangles, rule, options, level);
+    let topology = Topology::analyse(&triangles);
+    let (mut counts, mut dark) = (ShadowCounts::default(), 0);
+    for (k, level) in SimdLevel::available().into_iter().enumerate() {
+        let tree = crate::PointLightTree::build(light, triangles, rule, None, level);
+        let mut shadow = Vec::new();
+        tree.shadowed(receivers, &mut ShadowScratch::default(), &mut shadow);
+        for (i, receiver) in receivers.iter().enumerate() {
+            let place = || format!("tree, {name}, {}, {light:?}, {receiver:?}", level.name());
+            assert_eq!(shadow[i], expected[i], "{}", place());
+        }
+        let coarse = LightGridOptions {
+            resolution: Some(24),
+            ..LightGridOptions::default()
+        };
+        let (usual, paper) = (LightGridOptions::default(), LightGridOptions::paper());
+        let ways = [
+            (usual, false),
+            (paper, false),
+            (usual, true),
+            (coarse, true),
+            (paper, true),
+        ];
+        // Cells that are covered whole are found without lanes.
+        let ways = if k == 0 { &ways[..] } else { &ways[..2] };
+        for &(options, whole) in ways {
+            let grid = if whole {
+                PointLightGrid::build_with_topology(light, triangles, &topology, rule, options, level)
+            } else {
+                PointLightGrid::build(light, triangles, rule, options, level)
+            };
             let mut scratch = ShadowScratch::default();
             let mut shadow = Vec::new();
             grid.shadowed(receivers, &mut scratch, &mut shadow);
@@ -49,13 +75,17 @@ fn check(name: &str, mesh: &Mesh, receivers: &[Receiver], light: Light, rule: Ca
             }
             counts = scratch.counts;
             let spared = |receiver: &&Receiver| grid.cell_of(receiver).is_some_and(|cell| cell.spared);
-            assert_eq!(receivers.iter().filter(spared).count() as u64, counts.lit_by_cell);
+            let untested = counts.lit_by_cell + counts.dark_by_cell;
+            assert_eq!(receivers.iter().filter(spared).count() as u64, untested);
             for (receiver, _) in receivers.iter().zip(&shadow).filter(|(_, shadow)| **shadow) {
-                let cell = grid.cell_of(receiver);
-                assert!(cell.is_none_or(|cell| cell.casters > 0 && !cell.spared));
+                assert!(grid.cell_of(receiver).is_none_or(|cell| cell.casters > 0));
+            }
+            if whole {
+                dark += counts.dark_by_cell;
             }
         }
     }
+    counts.dark_by_cell = dark;
     counts
 }
 
@@ -262,5 +292,114 @@ fn a_huge_vertex_does_not_take_the_shadows() {
         for light in [Light::Point(Vec3::Y), Light::Directional(Vec3::Y)] {
             check("huge", &mesh, &receivers, light, &|_| Casts::Both);
         }
+    }
+}
+
+#[test]
+fn what_a_sheet_hides_is_dark_without_a_test() {
+    let mesh = Mesh::blob(40);
+    let mut numbers = Numbers(71);
+    // Below and beside a ball, seen from above.
+    let receivers: Vec<Receiver> = (0..4000)
+        .map(|_| {
+            let at = numbers.point() * 1.6;
+            Receiver::free(DVec3::new(f64::from(at.x), -1.5, f64::from(at.z)))
+        })
+        .collect();
+    for light in [
+        Light::Point(Vec3::new(0.2, 9.0, 0.1)),
+        Light::Directional(Vec3::Y),
+    ] {
+        for rule in [Casts::Both, Casts::Back] {
+            let triangles = mesh.triangles();
+            let topology = Topology::analyse(&triangles);
+            let options = LightGridOptions {
+                resolution: Some(64),
+                ..LightGridOptions::default()
+            };
+            let cast = |_| rule;
+            let level = SimdLevel::detect();
+            let grid =
+                PointLightGrid::build_with_topology(light, triangles, &topology, &cast, options, level);
+            let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
+            grid.shadowed(&receivers, &mut scratch, &mut shadow);
+            let in_shadow = shadow.iter().filter(|s| **s).count() as u64;
+            let dark = scratch.counts.dark_by_cell;
+            assert!(
+                in_shadow > 800 && dark * 10 > in_shadow * 8,
+                "{dark} of {in_shadow}, {light:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn holes_in_a_sheet_let_light_through() {
+    // A grating of quads in one plane, every third one left out; and one whose vertices have moved apart since the
+    // topology was found.
+    let mut mesh = Mesh::default();
+    let side = 12u32;
+    for i in 0..(side + 1) * (side + 1) {
+        let at = |v: u32| v as f32 / side as f32 * 2.0 - 1.0;
+        mesh.vertex(Vec3::new(at(i % (side + 1)), 0.5, at(i / (side + 1))));
+    }
+    for i in (0..side * side).filter(|i| i % 3 != 0) {
+        let a = i / side * (side + 1) + i % side;
+        mesh.indices.push([a, a + 1, a + side + 1]);
+        mesh.indices.push([a + 1, a + side + 2, a + side + 1]);
+    }
+    let mut numbers = Numbers(73);
+    let receivers = [(); 2000].map(|()| Receiver::free((numbers.point() - Vec3::Y).as_dvec3()));
+    for light in [
+        Light::Point(Vec3::new(0.3, 5.0, 0.2)),
+        Light::Directional(Vec3::Y),
+    ] {
+        let counts = check("grating", &mesh, &receivers, light, &|_| Casts::Both);
+        assert!(counts.dark_by_cell > 100, "{counts:?}");
+    }
+}
+
+#[test]
+fn a_tree_passes_what_its_metric_predicts() {
+    // So few casters that hardly a ray ends before it has passed all of its nodes.
+    for (seed, size) in [(1, 0.02), (2, 0.04), (3, 0.06)] {
+        let mesh = Mesh::soup(seed, 3000, size, 1.0);
+        let light = Light::Directional(Vec3::Y);
+        let level = SimdLevel::detect();
+        let tree = crate::PointLightTree::build(light, mesh.triangles(), &|_| Casts::Both, None, level);
+        let mut numbers = Numbers(seed + 10);
+        let receivers: Vec<Receiver> = (0..20_000)
+            .map(|_| Receiver::free(numbers.point().as_dvec3()))
+            .collect();
+        let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
+        tree.shadowed(&receivers, &mut scratch, &mut shadow);
+        let (counts, predicted) = (scratch.counts, tree.predicted());
+        let rays = counts.receivers as f64;
+        let measured = [counts.nodes as f64 / rays, counts.tests as f64 / rays];
+        for (measured, predicted) in measured.into_iter().zip([predicted.nodes, predicted.triangles]) {
+            let ratio = measured / predicted;
+            assert!(
+                (0.8..1.25).contains(&ratio),
+                "{measured} instead of {predicted}, size {size}"
+            );
+        }
+        // Of 3000 triangles, in some 330 nodes.
+        assert!(measured[0] < 12.0, "{measured:?}");
+    }
+}
+
+#[test]
+fn costs_follow_receivers_and_casters() {
+    let mesh = Mesh::blob(40);
+    let light = Light::Point(Vec3::new(3.0, 4.0, 2.0));
+    let predict =
+        |receivers| crate::ShadowCosts::predict(&light, &mesh.triangles(), &|_| Casts::Both, None, receivers);
+    let (few, many) = (predict(1000), predict(1_000_000));
+    for (few, many) in [
+        (few.receivers, many.receivers),
+        (few.grid, many.grid),
+        (few.tree, many.tree),
+    ] {
+        assert!(few > 0.0 && many > few + 30.0, "{few} and {many} ms");
     }
 }

@@ -36,7 +36,7 @@ impl PointLightGrid<'_> {
             }
             return;
         }
-        self.sort_into_cells(receivers, scratch);
+        self.sort_into_cells(receivers, scratch, |_| ());
         let ShadowScratch {
             pending,
             points,

@@ -14,8 +14,8 @@
 //!
 //! Layout, while one light is done: 12.5 to 25 bytes a pixel of blocks that ask, 44 bytes a block and light tile, 12 bytes
 //! a vertex and cluster, 40 bytes a caster and 12 bytes a reference of one face; kept in [`LitScratch`]. What is left
-//! is a bit a pixel. Limits: perspective eyes in lanes, others pixel by pixel; where coordinates pass 1e30 every caster is
-//! tested for every pixel.
+//! is a bit a pixel. Limits: perspective eyes in lanes, others pixel by pixel; where coordinates pass 1e30, or all is
+//! smaller than 1e-27, every caster is tested for every pixel.
 
 mod asked;
 mod casters;
