@@ -11,8 +11,8 @@ use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shown, Size,
-    Span, Up,
+    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shadows, Shown,
+    Size, Span, Up,
 };
 
 const HELP: &str = "\
@@ -330,6 +330,11 @@ pub(crate) struct PictureArgs {
     /// Which sides of triangles cast shadows
     #[arg(long, value_name = "SIDES", default_value = "auto", conflicts_with = "paper")]
     pub(crate) casters: Casters,
+    /// What finds the hard shadows of a light without a size; auto takes what is predicted to cost least. The picture does
+    /// not depend on it
+    #[arg(long, value_name = "STRUCTURE", default_value = "auto",
+        conflicts_with_all = ["paper", "reference", "aperture", "shutter"])]
+    pub(crate) shadow_structure: Shadows,
     /// Blended surfaces colour the light they let through, as stained glass does; they dim it otherwise
     #[arg(long, conflicts_with = "no_shadows")]
     pub(crate) tinted_shadows: bool,
@@ -364,7 +369,8 @@ pub(crate) struct PictureArgs {
     #[arg(long, value_name = "SECONDS", value_parser = values::positive, conflicts_with = "environment")]
     pub(crate) shutter: Option<f64>,
     /// The literal parameters of Hunt and Mark 2008: 100x100 tiles, 200x200 light grids, binning by bounding
-    /// rectangle, back faces alone as casters, soft shadows as the share of a light that is seen
+    /// rectangle, back faces alone as casters, surfaces shaded on every pass that finds a closer one, soft shadows as the
+    /// share of a light that is seen
     #[arg(long)]
     pub(crate) paper: bool,
     /// Test every triangle for every ray, in f64, to check the structures: the same picture, bit for bit. Small

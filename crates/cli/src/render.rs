@@ -234,6 +234,7 @@ pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
         height: size.height,
         shadows: !args.no_shadows,
         casters: args.casters.into(),
+        shadow_structure: args.shadow_structure.into(),
         samples: args.samples,
         seed: args.seed,
         tinted_shadows: args.tinted_shadows,

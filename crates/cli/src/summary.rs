@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use rayward::scene::{Material, Scene};
-use rayward::{FrameStats, RenderOptions};
+use rayward::{FrameStats, LightStats, RenderOptions, ShadowStructure};
 use serde::Serialize;
 
 use crate::args::MomentArgs;
@@ -45,6 +45,11 @@ pub(crate) struct Summary {
     secondary_rays: u64,
     exact_pixels: u64,
     lit_by_cell: u64,
+    dark_by_cell: u64,
+    /// Surfaces made for pixels.
+    surfaces: u64,
+    /// How the shadows of each light were found.
+    shadows: Vec<Shadows>,
     /// All rays over the time of builds and tiles, shading included.
     mray_per_s: f64,
     load_ms: f64,
@@ -86,6 +91,7 @@ impl Summary {
         if options.bounces == 0 {
             notices.extend(not_shaded(&input.scene));
         }
+        notices.extend(other_structure(options, stats));
         if moment.time != 0.0 && input.scene.animations.is_empty() {
             notices.push("--time: the scene has no animation".into());
         }
@@ -109,6 +115,9 @@ impl Summary {
             secondary_rays: stats.secondary_rays,
             exact_pixels: stats.exact_pixels,
             lit_by_cell: stats.lit_by_cell,
+            dark_by_cell: stats.dark_by_cell,
+            surfaces: stats.surfaces,
+            shadows: stats.lights.iter().map(Shadows::from).collect(),
             mray_per_s: rays / seconds.max(1e-9) / 1e6,
             load_ms: milliseconds(times.load),
             pose_ms: milliseconds(times.pose),
@@ -232,6 +241,69 @@ impl From<&rayward::StructureStats> for Structure {
             bytes: stats.bytes,
             cells: stats.cells,
             references: stats.references,
+        }
+    }
+}
+
+/// Said where receivers were asked for and could not be taken all at once.
+fn other_structure(options: &RenderOptions, stats: &FrameStats) -> Option<String> {
+    let grids = stats
+        .lights
+        .iter()
+        .filter(|light| light.structure == "grid")
+        .count();
+    let asked = options.shadow_structure == ShadowStructure::Receivers;
+    (asked && grids > 0).then(|| {
+        format!(
+            "--shadow-structure receivers: {grids} lights have grids, for some surfaces let light through"
+        )
+    })
+}
+
+/// How the shadows of a light were found.
+#[derive(Serialize)]
+struct Shadows {
+    light: String,
+    structure: &'static str,
+    /// What chose the structure, if it was not asked for: milliseconds on one thread.
+    predicted_ms: Option<Costs>,
+    steps: Option<Steps>,
+}
+
+#[derive(Serialize)]
+struct Costs {
+    receivers: f64,
+    grid: f64,
+    tree: f64,
+}
+
+/// Of a light's tree: what a ray was expected to pass, and what rays passed on average.
+#[derive(Serialize)]
+struct Steps {
+    rays: u64,
+    predicted_nodes: f64,
+    measured_nodes: f64,
+    predicted_triangles: f64,
+    measured_triangles: f64,
+}
+
+impl From<&LightStats> for Shadows {
+    fn from(stats: &LightStats) -> Self {
+        Self {
+            light: stats.name.clone(),
+            structure: stats.structure,
+            predicted_ms: stats.costs.map(|costs| Costs {
+                receivers: costs.receivers,
+                grid: costs.grid,
+                tree: costs.tree,
+            }),
+            steps: stats.steps.map(|steps| Steps {
+                rays: steps.rays,
+                predicted_nodes: steps.predicted.nodes,
+                measured_nodes: steps.measured.nodes,
+                predicted_triangles: steps.predicted.triangles,
+                measured_triangles: steps.measured.triangles,
+            }),
         }
     }
 }

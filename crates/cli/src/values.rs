@@ -1,7 +1,7 @@
 //! Values of the command line: parsed, checked, and nothing else.
 
 use glam::{DVec3, Vec3};
-use rayward::{CasterPolicy, LayerKind, Layers, Measure, PixelFilter, Shard, scene};
+use rayward::{CasterPolicy, LayerKind, Layers, Measure, PixelFilter, ShadowStructure, Shard, scene};
 
 /// What a parser returns.
 type Parsed<T> = Result<T, String>;
@@ -293,6 +293,30 @@ impl From<Casters> for CasterPolicy {
             Casters::Auto => Self::Auto,
             Casters::Both => Self::Both,
             Casters::Back => Self::Back,
+        }
+    }
+}
+
+/// What finds hard shadows.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub(crate) enum Shadows {
+    /// Whichever is predicted to cost the least
+    Auto,
+    /// What the eye sees sorted into the light's raster, casters drawn over it; a grid where surfaces let light through
+    Receivers,
+    /// A grid of casters, each receiver looked up in it
+    Grid,
+    /// A hierarchy of casters in the light's perspective space
+    Tree,
+}
+
+impl From<Shadows> for ShadowStructure {
+    fn from(shadows: Shadows) -> Self {
+        match shadows {
+            Shadows::Auto => Self::Auto,
+            Shadows::Receivers => Self::Receivers,
+            Shadows::Grid => Self::Grid,
+            Shadows::Tree => Self::Tree,
         }
     }
 }

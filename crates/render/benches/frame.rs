@@ -2,8 +2,9 @@
 //!
 //! `eye`: grid built, closest triangle of every pixel found. `eye_and_hard_shadows`: the same, then every pixel told
 //! whether one light reaches it. `eye_and_looked_up_shadows`: the same by HM08's own way, the light's grid built and
-//! one shadow ray looked up from every pixel that sees a surface. `eye_and_soft_shadows`: eight samples of a square
-//! light. No shading. Items are pixels and shadow rays.
+//! one shadow ray looked up from every pixel that sees a surface; `eye_and_dark_cells`: with cells that also know what
+//! they hide whole; `eye_and_shadows_by_tree`: in a hierarchy, whose predicted steps are printed beside those taken.
+//! `eye_and_soft_shadows`: eight samples of a square light. No shading. Items are pixels and shadow rays.
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` (a folder with `cameras.json`) where it is set. Run
 //! as a test (`cargo test --benches`) the raster is small.
@@ -16,8 +17,8 @@ use divan::counter::ItemsCount;
 use rayward::scene::{self, FrameGeometry, LoadOptions, PosedCamera, PosedLight};
 use rayward::trace::{
     AreaLight, AreaLightTree, AreaScratch, Casts, Clusters, EyeGrid, EyeGridOptions, Light, LightGridOptions,
-    LightQuery, LitPixels, LitScratch, PointLightGrid, Receiver, Samples, ShadowScratch, SimdLevel, TileHits,
-    View, Visibility, exact,
+    LightQuery, LitPixels, LitScratch, PointLightGrid, PointLightTree, Receiver, Samples, ShadowScratch,
+    SimdLevel, TileHits, Topology, View, Visibility, exact,
 };
 use rayward::{CameraFrame, FramePlan, RenderOptions, shadow_end, triangles};
 
@@ -65,6 +66,7 @@ struct Frame {
     geometry: FrameGeometry,
     /// Found once, as an animation would.
     clusters: Clusters,
+    topology: Topology,
     camera: PosedCamera,
     light: PosedLight,
     /// The light with a size.
@@ -89,6 +91,7 @@ fn load(name: &str) -> Frame {
         return Frame {
             name: name.into(),
             clusters: Clusters::new(&triangles(&geometry)),
+            topology: Topology::analyse(&triangles(&geometry)),
             geometry,
             camera,
             light,
@@ -108,6 +111,7 @@ fn load(name: &str) -> Frame {
     Frame {
         name: name.into(),
         clusters: Clusters::new(&triangles(&geometry)),
+        topology: Topology::analyse(&triangles(&geometry)),
         geometry,
         camera: entry.camera(),
         light: lights.pop().expect("a point light"),
@@ -216,24 +220,79 @@ fn eye_and_hard_shadows(bencher: Bencher, name: &str) {
     });
 }
 
-#[divan::bench(args = scenes())]
-fn eye_and_looked_up_shadows(bencher: Bencher, name: &str) {
+/// Answers for receivers, one entry each.
+type Ask<'a> = Box<dyn Fn(&[Receiver], &mut ShadowScratch, &mut Vec<bool>) + 'a>;
+
+/// Times eye rays and a shadow ray from everything seen, asked of what `build` makes for a light; says what was counted.
+fn look_up(bencher: Bencher, name: &str, build: impl for<'a> Fn(&'a Frame, Light) -> Ask<'a>) {
     with_frame(name, |frame| {
         let light = shadow_end(&frame.light, frame.geometry.origin);
         let (mut asked, view) = (0, view(frame));
         trace(frame, |receivers, _| asked += receivers.len());
         let rays = (view.width * view.height) as usize + asked;
-        bencher.counter(ItemsCount::new(rays)).bench_local(|| {
-            let (triangles, options) = (triangles(&frame.geometry), LightGridOptions::default());
-            let grid =
-                PointLightGrid::build(light, triangles, &|_| Casts::Both, options, SimdLevel::detect());
+        let run = || {
+            let ask = build(frame, light);
+            let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
+            trace(frame, |receivers, _| ask(receivers, &mut scratch, &mut shadow));
+            scratch.counts
+        };
+        if !is_test() {
+            println!("{name}: {:?}", run());
+        }
+        bencher.counter(ItemsCount::new(rays)).bench_local(run);
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_looked_up_shadows(bencher: Bencher, name: &str) {
+    look_up(bencher, name, |frame, light| {
+        let (triangles, options) = (triangles(&frame.geometry), LightGridOptions::default());
+        let level = SimdLevel::detect();
+        let grid = PointLightGrid::build(light, triangles, &|_| Casts::Both, options, level);
+        Box::new(move |receivers, scratch, shadow| grid.shadowed(receivers, scratch, shadow))
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_dark_cells(bencher: Bencher, name: &str) {
+    look_up(bencher, name, |frame, light| {
+        let (triangles, topology) = (triangles(&frame.geometry), &frame.topology);
+        let (options, level) = (LightGridOptions::default(), SimdLevel::detect());
+        let cast = |_| Casts::Both;
+        let grid = PointLightGrid::build_with_topology(light, triangles, topology, &cast, options, level);
+        Box::new(move |receivers, scratch, shadow| grid.shadowed(receivers, scratch, shadow))
+    });
+}
+
+#[divan::bench(args = scenes())]
+fn eye_and_shadows_by_tree(bencher: Bencher, name: &str) {
+    if !is_test() {
+        with_frame(name, |frame| {
+            let tree = tree(frame, shadow_end(&frame.light, frame.geometry.origin));
             let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
             trace(frame, |receivers, _| {
-                grid.shadowed(receivers, &mut scratch, &mut shadow);
+                tree.shadowed(receivers, &mut scratch, &mut shadow);
             });
-            scratch.counts
+            let (counts, predicted) = (scratch.counts, tree.predicted());
+            let mean = |sum: u64| sum as f64 / counts.receivers as f64;
+            println!(
+                "{name}: {:.1} nodes a ray predicted, {:.1} entered; {:.1} triangles predicted, {:.1} tested",
+                predicted.nodes,
+                mean(counts.nodes),
+                predicted.triangles,
+                mean(counts.tests)
+            );
         });
+    }
+    look_up(bencher, name, |frame, light| {
+        let tree = tree(frame, light);
+        Box::new(move |receivers, scratch, shadow| tree.shadowed(receivers, scratch, shadow))
     });
+}
+
+fn tree(frame: &Frame, light: Light) -> PointLightTree<'_> {
+    let (triangles, level) = (triangles(&frame.geometry), SimdLevel::detect());
+    PointLightTree::build(light, triangles, &|_| Casts::Both, None, level)
 }
 
 #[divan::bench(args = scenes())]

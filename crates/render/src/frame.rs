@@ -11,6 +11,7 @@ use rayward_trace::{Clusters, Topology};
 use crate::casters::{CasterRules, transparent_triangles};
 use crate::distributed::{self, Shutter};
 use crate::geometry::triangles;
+use crate::light_stats::light_stats;
 use crate::mean::Mean;
 use crate::plan::FramePlan;
 use crate::reference::EveryTriangle;
@@ -102,12 +103,9 @@ impl<'s> Renderer<'s> {
         let rules = CasterRules::new(self.scene, geometry, topology, options.casters(), eye);
 
         let environment = self.environment.as_ref();
-        let plan = FramePlan::new(geometry, lights, options).with_secondary(
-            self.scene,
-            geometry,
-            environment.is_some(),
-            options,
-        );
+        let plan = FramePlan::new(geometry, lights, options)
+            .with_secondary(self.scene, geometry, environment.is_some(), options)
+            .with_shadow_structures(geometry, &rules, self.secondary.takes_shadows(), options);
         let eye = camera.vantage();
         let samples = options.pixel_samples.max(1);
         let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));
@@ -167,6 +165,7 @@ impl<'s> Renderer<'s> {
         }
         self.mark(&mut film, geometry, posed, None, lights, options);
         let mut stats = stats(geometry, options, counts);
+        stats.lights = light_stats(&plan, &structures.lights);
         stats.structures = structures.stats;
         (stats.build, stats.trace) = (build, start.elapsed());
         Ok(RenderedFrame { film, stats })
@@ -264,6 +263,8 @@ fn stats(geometry: &FrameGeometry, options: &RenderOptions, counts: TileCounts) 
         secondary_rays: counts.secondary_rays,
         exact_pixels: counts.exact_pixels,
         lit_by_cell: counts.lit_by_cell,
+        dark_by_cell: counts.dark_by_cell,
+        surfaces: counts.surfaces,
         ..FrameStats::default()
     }
 }

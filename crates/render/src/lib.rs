@@ -37,6 +37,7 @@ mod geometry;
 mod heat_map;
 pub mod image_io;
 mod lens;
+mod light_stats;
 mod mean;
 mod motion;
 mod options;
@@ -67,8 +68,9 @@ pub use geometry::{shadow_end, triangles};
 pub use heat_map::{HeatMap, Measure};
 pub use image_io::{Picture, read_picture};
 pub use lens::Lens;
+pub use light_stats::{LightStats, LightSteps};
 pub use motion::{Moment, add_motion};
-pub use options::{CasterPolicy, RenderOptions};
+pub use options::{CasterPolicy, RenderOptions, ShadowStructure};
 pub use pixel_filter::PixelFilter;
 pub use plan::{FramePlan, LightPlan};
 pub use secondary::{

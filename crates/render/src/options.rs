@@ -16,6 +16,8 @@ pub struct RenderOptions {
     pub shadows: bool,
     /// Which sides of triangles cast them.
     pub casters: CasterPolicy,
+    /// What finds the hard shadows of lights without a size. The picture does not depend on it.
+    pub shadow_structure: ShadowStructure,
     /// Whether blended surfaces colour the light they let through; they dim it otherwise.
     pub tinted_shadows: bool,
     /// Radiance that surrounds the scene, for surfaces that no light reaches. An environment takes its place.
@@ -46,7 +48,8 @@ pub struct RenderOptions {
     /// The share of the picture that is rendered; all of it unless given. Pixels of other shares see nothing.
     pub shard: Option<Shard>,
     /// The literal parameters of HM08: 100 x 100 tiles, 200 x 200 light grids, binning by bounding rectangle,
-    /// back faces alone as casters, lights with a size shaded from their middle times the share of samples seen.
+    /// back faces alone as casters, surfaces shaded each time that a closer one is found, lights with a size shaded from
+    /// their middle times the share of samples seen.
     pub paper: bool,
     /// Every ray answered by testing every triangle in f64: the same picture, slowly, to check structures against.
     pub reference: bool,
@@ -61,6 +64,7 @@ impl Default for RenderOptions {
             height: 1080,
             shadows: true,
             casters: CasterPolicy::Auto,
+            shadow_structure: ShadowStructure::Auto,
             tinted_shadows: false,
             ambient: Vec3::splat(0.1),
             background: Vec3::new(0.44, 0.54, 0.68),
@@ -93,6 +97,22 @@ pub enum CasterPolicy {
     Both,
     /// Back faces of all, as in HM08: wrong shadows where surfaces are open.
     Back,
+}
+
+/// What finds the hard shadows of a light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ShadowStructure {
+    /// What is predicted to cost the least ([`rayward_trace::ShadowCosts`]); HM08's grid with its parameters.
+    #[default]
+    Auto,
+    /// All that the eye sees, sorted into the light's raster, over which casters are drawn
+    /// ([`rayward_trace::LitPixels`]). A grid where pixels may see several surfaces behind each other, or with HM08's
+    /// parameters.
+    Receivers,
+    /// A grid of casters ([`rayward_trace::PointLightGrid`]).
+    Grid,
+    /// A hierarchy of casters ([`rayward_trace::PointLightTree`]).
+    Tree,
 }
 
 impl RenderOptions {

@@ -4,7 +4,7 @@
 //! | rays | structure |
 //! |---|---|
 //! | eye rays | one tiled perspective grid (HM08 §5.1) |
-//! | shadow rays of a light | one perspective grid each (HM08 §5.2) |
+//! | shadow rays of a light | a grid of receivers, a grid or a tree of casters each (HM08 §5.2), whichever is predicted to cost least |
 //! | shadow rays of a light with a size | one tree in its perspective space each (HM08 §5.3); with the papers' parameters one 3-D grid each |
 //! | those of eye and lights through masked and blended surfaces | a grid of these alone for each, if there are any |
 //! | those of lights with a size through them | a hierarchy, if there are both |
@@ -12,11 +12,12 @@
 
 use glam::DVec3;
 use rayward_scene::{FrameGeometry, LightKind, Material, PosedLight, Scene};
-use rayward_trace::{AreaLight, Cone, EyeGridOptions, FaceOptions, Light, LightGridOptions};
+use rayward_trace::{AreaLight, Cone, EyeGridOptions, FaceOptions, Light, LightGridOptions, ShadowCosts};
 
-use crate::RenderOptions;
 use crate::bounce::GLOSSY;
-use crate::geometry::shadow_end;
+use crate::casters::CasterRules;
+use crate::geometry::{shadow_end, triangles};
+use crate::{RenderOptions, ShadowStructure};
 
 /// The structures of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,12 +37,26 @@ pub struct LightPlan {
     pub name: String,
     /// Where the shadow rays end.
     pub light: Light,
+    /// What finds its hard shadows.
+    pub structure: ShadowStructure,
+    /// What each way is predicted to cost, where that chose.
+    pub costs: Option<ShadowCosts>,
     /// Parameters of its grid.
     pub grid: LightGridOptions,
+    /// Whether cells of the grid also know beyond which nearness they are dark.
+    pub dark_cells: bool,
     /// The light with its size, if it has one: it then has a tree instead of a grid.
     pub area: Option<AreaLight>,
     /// The cells of the 3-D grid that a light with a size has instead of the tree, if it does.
     pub soft_grid: Option<FaceOptions>,
+}
+
+impl LightPlan {
+    /// Whether its shadows are found for all pixels at once, where every pixel sees one surface.
+    pub(crate) fn at_once(&self) -> bool {
+        let chosen = matches!(self.structure, ShadowStructure::Receivers | ShadowStructure::Auto);
+        self.area.is_none() && chosen
+    }
 }
 
 /// A spot light wider than this gets the faces of a point light, radians.
@@ -60,6 +75,11 @@ impl FramePlan {
         } else {
             LightGridOptions::default()
         };
+        let structure = if options.paper {
+            ShadowStructure::Grid
+        } else {
+            options.shadow_structure
+        };
         let plan = |light: &PosedLight| {
             let cone = match light.kind {
                 LightKind::Spot { outer, .. } if outer < WIDEST_CONE => Some(Cone {
@@ -71,7 +91,10 @@ impl FramePlan {
             LightPlan {
                 name: light.name.clone(),
                 light: shadow_end(light, geometry.origin),
+                structure,
+                costs: None,
                 grid: LightGridOptions { cone, ..grid },
+                dark_cells: !options.paper,
                 area: area_light(light, geometry.origin),
                 soft_grid: options.paper.then(FaceOptions::paper),
             }
@@ -85,6 +108,44 @@ impl FramePlan {
             lights,
             secondary: false,
         }
+    }
+
+    /// The same with a structure chosen for the hard shadows of each light that leaves the choice. `together` tells whether
+    /// another structure answers all pixels at once.
+    pub fn with_shadow_structures(
+        mut self,
+        geometry: &FrameGeometry,
+        rules: &CasterRules,
+        together: bool,
+        options: &RenderOptions,
+    ) -> Self {
+        // Layers behind each other are receivers of their own, and the paper looks each ray up.
+        let one_surface = !rules.any_transparent() && !options.paper;
+        // Half of what is seen is turned away from a light.
+        let pixels = u64::from(options.width) * u64::from(options.height) / 2;
+        for plan in self
+            .lights
+            .iter_mut()
+            .flatten()
+            .filter(|plan| plan.area.is_none())
+        {
+            plan.grid.receivers = pixels;
+            plan.structure = match plan.structure {
+                ShadowStructure::Receivers if !one_surface => ShadowStructure::Grid,
+                ShadowStructure::Auto if options.reference || (one_surface && together) => {
+                    ShadowStructure::Receivers
+                }
+                ShadowStructure::Auto => {
+                    let rule = rules.for_light(geometry, &plan.light);
+                    let (light, cone) = (&plan.light, plan.grid.cone);
+                    let costs = ShadowCosts::predict(light, &triangles(geometry), &rule, cone, pixels);
+                    plan.costs = Some(costs);
+                    cheapest(&costs, one_surface)
+                }
+                chosen => chosen,
+            };
+        }
+        self
     }
 
     /// The same with rays that leave surfaces, where the materials seen or an environment ask for such.
@@ -104,6 +165,20 @@ impl FramePlan {
             secondary: environment || bounces,
             ..self
         }
+    }
+}
+
+/// What costs the least; all at once only where every pixel sees one surface.
+fn cheapest(costs: &ShadowCosts, one_surface: bool) -> ShadowStructure {
+    let by_caster = if costs.tree < costs.grid {
+        (costs.tree, ShadowStructure::Tree)
+    } else {
+        (costs.grid, ShadowStructure::Grid)
+    };
+    if one_surface && costs.receivers <= by_caster.0 {
+        ShadowStructure::Receivers
+    } else {
+        by_caster.1
     }
 }
 

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use crate::LightStats;
+
 /// Counts and times of one frame.
 #[derive(Clone, Debug, Default)]
 pub struct FrameStats {
@@ -25,6 +27,12 @@ pub struct FrameStats {
     pub exact_pixels: u64,
     /// Shadow rays answered by the nearest distance of their cell alone.
     pub lit_by_cell: u64,
+    /// Shadow rays that end in shadow by what covers their cell whole, without a test.
+    pub dark_by_cell: u64,
+    /// Surfaces made for pixels; with HM08's parameters one for each time that a closer one was found.
+    pub surfaces: u64,
+    /// How the shadows of each light were found.
+    pub lights: Vec<LightStats>,
     /// Wall time of all builds.
     pub build: Duration,
     /// Wall time of all tiles: tracing and shading.

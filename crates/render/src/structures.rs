@@ -6,17 +6,18 @@ use std::time::Instant;
 use rayward_scene::FrameGeometry;
 use rayward_trace::{
     AreaLightGrid, AreaLightTree, Casts, Clusters, EyeGrid, EyeVeils, Light, LightQuery, LitPixels,
-    LitScratch, PointLightGrid, Receiver, SimdLevel, Tile, Triangles, View, Visibility,
+    LitScratch, PointLightGrid, PointLightTree, Receiver, SimdLevel, Tile, Triangles, View, Visibility,
 };
 
 use crate::casters::CasterRules;
 use crate::costs::Measured;
 use crate::geometry::triangles;
+use crate::light_stats::Passed;
 use crate::plan::{FramePlan, LightPlan};
 use crate::reference::EveryTriangle;
 use crate::secondary::{SecondaryBuilder, SecondaryTracer};
 use crate::tile::TileCounts;
-use crate::{CasterPolicy, RenderOptions, StructureStats};
+use crate::{CasterPolicy, RenderOptions, ShadowStructure, StructureStats};
 
 /// All structures of one frame.
 #[derive(Debug)]
@@ -54,6 +55,8 @@ pub enum LightShadows<'g> {
     Nothing,
     /// Point by point in its grid.
     Grid(PointLightGrid<'g>),
+    /// Point by point in its tree, and what was passed in it.
+    Tree(PointLightTree<'g>, Passed),
     /// For all pixels at once, before they are shaded.
     Pixels(LitPixels),
     /// By samples of its area.
@@ -86,7 +89,7 @@ impl<'g> FrameStructures<'g> {
         );
 
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
-        let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(|p| p.area.is_none());
+        let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(LightPlan::at_once);
         let slowly = rules.any_transparent() || options.paper || options.reference;
         let at_once = plan.lights.iter().any(hard) && !slowly;
         let visibility = at_once.then(|| {
@@ -362,7 +365,7 @@ fn shadows_of<'g>(
         return LightShadows::Area(tree.with_topology(rules.topology()));
     }
     let rule = rules.for_light(geometry, &plan.light);
-    match visibility {
+    match visibility.filter(|_| plan.at_once()) {
         Some(visibility) => {
             let query = LightQuery {
                 light: plan.light,
@@ -376,6 +379,16 @@ fn shadows_of<'g>(
             });
             let find = || LitPixels::find(visibility, &triangles, clusters, &query, level, scratch);
             LightShadows::Pixels(asked.unwrap_or_else(find))
+        }
+        None if plan.structure == ShadowStructure::Tree => {
+            let tree = PointLightTree::build(plan.light, triangles, &rule, plan.grid.cone, level);
+            LightShadows::Tree(tree, Passed::default())
+        }
+        None if plan.dark_cells => {
+            let (light, topology) = (plan.light, rules.topology());
+            let grid =
+                PointLightGrid::build_with_topology(light, triangles, topology, &rule, plan.grid, level);
+            LightShadows::Grid(grid)
         }
         None => LightShadows::Grid(PointLightGrid::build(
             plan.light, triangles, &rule, plan.grid, level,
@@ -393,6 +406,7 @@ impl LightShadows<'_> {
                 grid.cell_count(),
                 grid.reference_count(),
             ),
+            Self::Tree(tree, _) => ("light tree", tree.bytes(), tree.node_count(), tree.caster_count()),
             Self::Pixels(LitPixels { counts, .. }) => (
                 "receiver grid",
                 counts.bytes,

@@ -1,6 +1,7 @@
 //! One tile: eye hits, surfaces, shadows light by light, colours (HM08 §3: eye rays drive everything, shadow
 //! rays are spawned for a tile of hits at a time).
 
+mod passes;
 pub(crate) mod soft;
 mod solids;
 
@@ -24,6 +25,7 @@ use crate::solids::{FrameSolids, OnSolid};
 use crate::structures::{FrameStructures, LightShadows};
 use crate::{CameraFrame, Environment, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
+use passes::Passes;
 
 /// Everything a tile needs to know of its frame.
 pub(crate) struct TileShader<'f> {
@@ -61,11 +63,23 @@ pub(crate) struct TileWork {
     pixels: Vec<u32>,
     visible: Vec<u32>,
     area: AreaScratch,
+    passes: Passes,
+    surfaces: u64,
     veils: TileVeils,
     veil_scratch: ShadowScratch,
     passed: Vec<Vec3>,
     filters: Vec<u32>,
     along: Vec<(f64, u32)>,
+}
+
+/// A surface where a ray meets a triangle, and its light that needs no shadow rays.
+pub(crate) struct Shaded {
+    prim: u32,
+    object: u32,
+    t: f64,
+    bary: Vec2,
+    color: Vec3,
+    surface: Surface,
 }
 
 /// What has been seen of a pixel so far.
@@ -94,6 +108,8 @@ pub(crate) struct TileCounts {
     pub(crate) secondary_rays: u64,
     pub(crate) exact_pixels: u64,
     pub(crate) lit_by_cell: u64,
+    pub(crate) dark_by_cell: u64,
+    pub(crate) surfaces: u64,
 }
 
 impl TileCounts {
@@ -103,6 +119,8 @@ impl TileCounts {
             secondary_rays: self.secondary_rays + other.secondary_rays,
             exact_pixels: self.exact_pixels + other.exact_pixels,
             lit_by_cell: self.lit_by_cell + other.lit_by_cell,
+            dark_by_cell: self.dark_by_cell + other.dark_by_cell,
+            surfaces: self.surfaces + other.surfaces,
         }
     }
 }
@@ -131,7 +149,10 @@ impl TileShader<'_> {
         let tile = self.structures.eye.tile(index);
         // References trace pixel by pixel.
         let traced = self.structures.visibility.is_some() || self.reference.is_some();
-        if !traced {
+        work.surfaces = 0;
+        if !traced && self.options.paper {
+            self.shade_passes(&tile, work);
+        } else if !traced {
             self.structures.eye.trace_tile(&tile, &mut work.hits);
         }
         if let Some(veils) = &self.structures.veils {
@@ -148,7 +169,7 @@ impl TileShader<'_> {
             let sample = self.see(&tile, [x, y], work);
             out.put(x, y, &sample);
         }
-        for light in 0..self.lights.len() {
+        for light in self.shadowed_lights() {
             match &self.structures.lights[light] {
                 LightShadows::Area(tree) => self.illuminate_softly(light, tree.light(), &tile, work),
                 _ => match self.ends[light].as_ref().and_then(|plan| plan.area.as_ref()) {
@@ -170,6 +191,8 @@ impl TileShader<'_> {
             secondary_rays: work.bounce.secondary_rays,
             exact_pixels: if traced { 0 } else { work.hits.exact_pixels as u64 },
             lit_by_cell: work.scratch.counts.lit_by_cell + work.area.counts.untested,
+            dark_by_cell: work.scratch.counts.dark_by_cell,
+            surfaces: work.surfaces,
         }
     }
 
@@ -205,7 +228,12 @@ impl TileShader<'_> {
         let solid = self.solid_at([x, y], ray, work);
         let solid_t = solid.map_or(f64::INFINITY, |(_, crossing)| crossing.t);
         let TileWork {
-            hits, veils, points, ..
+            hits,
+            veils,
+            points,
+            passes,
+            surfaces,
+            ..
         } = work;
         let through = match &self.structures.veils {
             Some(_) => veils.pixel(x, y),
@@ -216,20 +244,34 @@ impl TileShader<'_> {
             .seen(tile, x, y)
             .unwrap_or_else(|| hits.prim(x, y));
         for veil in through.iter().take_while(|veil| veil.hit.t <= solid_t) {
-            self.note([x, y], ray, veil.prim, &veil.hit, seen, points);
+            *surfaces += 1;
+            self.note([x, y], ray, self.shade(ray, veil.prim, &veil.hit), seen, points);
             if seen.left < INVISIBLE {
                 seen.left = 0.0;
                 break;
             }
         }
-        if let Some(prim) = opaque.filter(|_| seen.left > 0.0)
-            && let Some(hit) = exact::attributes(ray.origin, ray.dir, triangles(self.geometry).corners(prim))
-            && hit.t <= solid_t
-        {
-            self.note([x, y], ray, prim, &hit, seen, points);
-        } else if let Some(solid) = solid.filter(|_| seen.left > 0.0) {
+        if seen.left <= 0.0 {
+            return;
+        }
+        let shaded = opaque.and_then(|prim| {
+            passes.take(tile, [x, y]).or_else(|| {
+                *surfaces += 1;
+                self.shade_hit(ray, prim)
+            })
+        });
+        if let Some(shaded) = shaded.filter(|shaded| shaded.t <= solid_t) {
+            self.note([x, y], ray, shaded, seen, points);
+        } else if let Some(solid) = solid {
             self.note_solid([x, y], ray, &solid, seen, points);
         }
+    }
+
+    /// The surface of a triangle that a ray is known to meet.
+    fn shade_hit(&self, ray: &ViewRay, prim: u32) -> Option<Shaded> {
+        let corners = triangles(self.geometry).corners(prim);
+        let hit = exact::attributes(ray.origin, ray.dir, corners)?;
+        Some(self.shade(ray, prim, &hit))
     }
 
     /// As [`Self::see_through`], every triangle tested.
@@ -247,7 +289,8 @@ impl TileShader<'_> {
         for &(_, prim) in work.along.iter().take_while(|(t, _)| *t <= solid_t) {
             let corners = triangles(self.geometry).corners(prim);
             if let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) {
-                self.note(pixel, ray, prim, &hit, seen, &mut work.points);
+                work.surfaces += 1;
+                self.note(pixel, ray, self.shade(ray, prim, &hit), seen, &mut work.points);
             }
             if seen.left < INVISIBLE {
                 seen.left = 0.0;
@@ -259,16 +302,8 @@ impl TileShader<'_> {
         }
     }
 
-    /// Notes a surface where a ray meets it, if any of it is seen.
-    fn note(
-        &self,
-        [x, y]: [u32; 2],
-        ray: &ViewRay,
-        prim: u32,
-        hit: &ExactHit,
-        seen: &mut Seen,
-        points: &mut Vec<ShadedPoint>,
-    ) {
+    /// The surface where a ray meets a triangle, and its light that needs no shadow rays.
+    fn shade(&self, ray: &ViewRay, prim: u32, hit: &ExactHit) -> Shaded {
         let (depth, object) = (hit.t as f32, object_of(self.geometry, prim));
         let bary = Vec2::new(hit.u as f32, hit.v as f32);
         let surface = self.shader.surface(
@@ -282,11 +317,39 @@ impl TileShader<'_> {
                 footprint: self.camera.footprint(depth),
             },
         );
+        Shaded {
+            prim,
+            object,
+            t: hit.t,
+            bary,
+            color: self.resting(&surface, 0),
+            surface,
+        }
+    }
+
+    /// Notes a surface where a ray meets it, if any of it is seen.
+    fn note(
+        &self,
+        [x, y]: [u32; 2],
+        ray: &ViewRay,
+        shaded: Shaded,
+        seen: &mut Seen,
+        points: &mut Vec<ShadedPoint>,
+    ) {
+        let Shaded {
+            prim,
+            object,
+            t,
+            bary,
+            color,
+            surface,
+        } = shaded;
         let weight = seen.left * surface.alpha;
         if weight <= 0.0 {
             return;
         }
         if seen.left == 1.0 {
+            let depth = t as f32;
             seen.sample = Sample {
                 depth,
                 distance: depth * ray.dir.length() as f32,
@@ -301,10 +364,10 @@ impl TileShader<'_> {
         points.push(ShadedPoint {
             x,
             y,
-            receiver: Receiver::along(ray, hit.t, prim),
+            receiver: Receiver::along(ray, t, prim),
             on: None,
             weight,
-            color: self.resting(&surface, 0),
+            color,
             surface,
         });
     }
@@ -350,6 +413,11 @@ impl TileShader<'_> {
         }
         match &self.structures.lights[light] {
             LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
+            LightShadows::Tree(tree, passed) => {
+                let before = scratch.counts;
+                tree.shadowed(receivers, scratch, shadow);
+                passed.add(&before, &scratch.counts);
+            }
             LightShadows::Reference => self.shadowed_by_any(light, receivers, shadow),
             LightShadows::Nothing
             | LightShadows::Pixels(_)

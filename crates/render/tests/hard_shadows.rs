@@ -6,8 +6,8 @@ use rayward::scene::{FrameGeometry, LightKind, PosedCamera, PosedLight, Scene, b
 use rayward::shade::{ambient, direct, object_of};
 use rayward::trace::{Accel, BruteForce, Light, Receiver, SimdLevel, Triangles, exact};
 use rayward::{
-    CameraFrame, CasterPolicy, Film, Layers, NO_ID, RenderOptions, Renderer, Shader, ShadingLight,
-    SurfacePoint, shadow_end, triangles,
+    CameraFrame, CasterPolicy, Film, Layers, LightSteps, NO_ID, RenderOptions, Renderer, Shader,
+    ShadingLight, ShadowStructure, SurfacePoint, shadow_end, triangles,
 };
 
 /// The closest triangle on a ray whose direction is f64, by testing all.
@@ -130,6 +130,79 @@ fn check(name: &str, time: f32, size: [u32; 2], alter: impl Fn(&mut FrameGeometr
                 "{name}: an empty picture proves nothing"
             );
         }
+    }
+}
+
+#[test]
+fn structures_give_the_same_pictures() {
+    for (name, size) in [
+        ("blob-4k", [160, 120]),
+        ("office", [160, 100]),
+        ("courtyard", [160, 100]),
+        ("forest", [120, 80]),
+    ] {
+        let scene = builtin::build(name).expect("it exists");
+        let mut geometry = scene.at(0.5);
+        scatter_lights(&mut geometry, 3);
+        let with = |shadow_structure| {
+            let options = RenderOptions {
+                width: size[0],
+                height: size[1],
+                layers: Layers::ALL,
+                shadow_structure,
+                ..RenderOptions::default()
+            };
+            let mut renderer = Renderer::new(&scene);
+            let camera = &geometry.cameras[0];
+            let frame = renderer.render(&geometry, camera, &geometry.lights, &options, &|_| ());
+            frame.expect("valid input")
+        };
+        let auto = with(ShadowStructure::Auto);
+        assert!(
+            auto.stats.lights.iter().all(|light| light.costs.is_some()),
+            "{name}"
+        );
+        for (structure, used) in [
+            (ShadowStructure::Receivers, "receivers"),
+            (ShadowStructure::Grid, "grid"),
+            (ShadowStructure::Tree, "tree"),
+        ] {
+            let frame = with(structure);
+            assert!(frame.film == auto.film, "{name}, {structure:?}");
+            let lights = &frame.stats.lights;
+            let alike = lights.iter().all(|l| l.structure == used && l.costs.is_none());
+            assert!(alike, "{name}, {lights:?}");
+            // A light inside of a blob is asked by nobody.
+            let passed = |s: LightSteps| s.rays > 0 && s.measured.nodes > 0.5;
+            let passed = lights.iter().any(|light| light.steps.is_some_and(passed));
+            assert_eq!(passed, used == "tree", "{name}, {lights:?}");
+        }
+    }
+}
+
+#[test]
+fn shading_on_every_pass_is_the_same_picture() {
+    let scene = builtin::build("courtyard").expect("it exists");
+    let geometry = scene.at(0.5);
+    let camera = &geometry.cameras[0];
+    for shadows in [true, false] {
+        let with = |paper| {
+            let options = RenderOptions {
+                width: 240,
+                height: 150,
+                layers: Layers::ALL,
+                casters: CasterPolicy::Back,
+                shadows,
+                paper,
+                ..RenderOptions::default()
+            };
+            let frame = Renderer::new(&scene).render(&geometry, camera, &geometry.lights, &options, &|_| ());
+            frame.expect("valid input")
+        };
+        let (paper, once) = (with(true), with(false));
+        assert!(paper.film == once.film, "shadows {shadows}");
+        let passes = [paper, once].map(|frame| frame.stats.surfaces);
+        assert!(passes[0] > passes[1] * 11 / 10 && passes[1] > 0, "{passes:?}");
     }
 }
 

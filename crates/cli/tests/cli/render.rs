@@ -109,6 +109,53 @@ fn json_is_one_object_and_quiet_is_quiet() {
 }
 
 #[test]
+fn structures_of_hard_shadows_are_chosen_or_asked_for() {
+    let folder = Folder::new();
+    let with = |structure: &str| {
+        let name = format!("{structure}.png");
+        let args = [
+            "--json",
+            "--light",
+            "point:3,4,2",
+            "-o",
+            &name,
+            "--shadow-structure",
+            structure,
+        ];
+        let json = folder.run(&small(&args)).expect(0).json();
+        (
+            std::fs::read(folder.path(&name)).expect("the picture"),
+            json["shadows"][0].clone(),
+        )
+    };
+    let (auto, chosen) = with("auto");
+    let predicted = |way: &str| chosen["predicted_ms"][way].as_f64();
+    assert!(
+        ["receivers", "grid", "tree"]
+            .iter()
+            .all(|way| predicted(way).is_some_and(|ms| ms > 0.0))
+    );
+    for structure in ["receivers", "grid", "tree"] {
+        let (picture, shadows) = with(structure);
+        assert!(picture == auto, "{structure} changes the picture");
+        assert_eq!(shadows["structure"], structure);
+        assert!(shadows["predicted_ms"].is_null());
+        let steps = &shadows["steps"];
+        let both = ["predicted_nodes", "measured_nodes"].map(|key| steps[key].as_f64().unwrap_or(0.0));
+        assert_eq!(
+            both.iter().all(|&nodes| nodes > 0.0),
+            structure == "tree",
+            "{steps}"
+        );
+    }
+    let both = small(&["--paper", "--shadow-structure", "tree"]);
+    folder
+        .run(&both)
+        .expect(2)
+        .says(&["--paper", "--shadow-structure"]);
+}
+
+#[test]
 fn layers_go_to_exr_and_npy() {
     let folder = Folder::new();
     folder
