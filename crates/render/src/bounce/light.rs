@@ -1,6 +1,6 @@
 //! The light of surfaces that paths have come to: from lights, and from an environment.
 //!
-//! A light without a size, seen by a mirror that a rough lobe found by chance, would be a rare and very bright dot in the
+//! A light without a size, seen by a mirror that a diffuse ray found by chance, would be a rare and very bright dot in the
 //! picture. Such mirrors are lit as if they were rougher ([`SOFTENED`]), so their caustics are blurred (path-space
 //! regularisation, Kaplanyan and Dachsbacher 2013).
 //!
@@ -25,13 +25,13 @@ use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
 
-/// Least roughness of surfaces lit after a rough lobe.
+/// Least roughness of surfaces lit on the way of a diffuse ray.
 const SOFTENED: f32 = 0.4;
 
 /// An arrival's surface as it is lit.
 fn lit_surface(arrival: &Arrival) -> Surface {
     let surface = arrival.surface;
-    if arrival.sharp > 0.0 {
+    if !arrival.diffused {
         return surface;
     }
     Surface {

@@ -77,6 +77,8 @@ struct Flight {
     absorption: Vec3,
     /// Whether it sees the surrounding light where nothing is, instead of the background.
     diffuse: bool,
+    /// Whether it or one before it was such.
+    diffused: bool,
     cone: Cone,
     path: Path,
 }
@@ -106,6 +108,8 @@ pub(crate) struct Arrival {
     weight: Vec3,
     /// Share of the pixel that shows the surface by smooth lobes alone: what its samples are worth.
     sharp: f32,
+    /// Whether a diffuse ray is on the path.
+    diffused: bool,
     surface: Surface,
     receiver: Receiver,
     on: OnSolid,
@@ -220,6 +224,7 @@ impl TileShader<'_> {
             pixel: [point.x, point.y],
             weight: Vec3::splat(point.weight),
             sharp: 1.0,
+            diffused: false,
             surface: point.surface,
             receiver: point.receiver,
             on: point.on,
@@ -328,6 +333,7 @@ impl TileShader<'_> {
                 pixel: flight.pixel,
                 weight: weight * surface.alpha,
                 sharp: flight.sharp,
+                diffused: flight.diffused,
                 receiver,
                 on: None,
                 bounces: flight.bounces,
@@ -369,6 +375,7 @@ impl TileShader<'_> {
             pixel: flight.pixel,
             weight: flight.weight * absorbed(inside, distance),
             sharp: flight.sharp,
+            diffused: flight.diffused,
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,
@@ -453,6 +460,7 @@ impl TileShader<'_> {
             Some(_) => self.directions(arrival.sharp) as f32,
         };
         let smooth = purpose != DIFFUSED && lobes::is_smooth(surface);
+        let diffuse = purpose == DIFFUSED || (purpose == REFLECTED && surface.roughness > GLOSSY);
         for i in 0..rays {
             let k = self.sample * rays + i;
             let Some(lobe) = draw(self.draw(arrival.path, purpose, k)) else {
@@ -486,7 +494,8 @@ impl TileShader<'_> {
                 bounces: arrival.bounces + 1,
                 passed: 0,
                 absorption,
-                diffuse: purpose == DIFFUSED || (purpose == REFLECTED && surface.roughness > GLOSSY),
+                diffuse,
+                diffused: diffuse || arrival.diffused,
                 cone: Cone {
                     spread: arrival.cone.spread.max(spread),
                     ..arrival.cone
