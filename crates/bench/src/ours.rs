@@ -5,12 +5,11 @@
 
 use std::sync::Mutex;
 
-use glam::DVec3;
 use rayon::prelude::*;
 use rayward::trace::{
     AreaLightTree, AreaScratch, BLOCK_LANES, Candidates, Casts, EyeGrid, EyeGridOptions, FaceOptions, Facets,
     Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PerspectiveGrids, PointLightGrid, Receiver,
-    ShadowScratch, SimdLevel, Tile, TileHits, Visibility, darken, darken_unlit, exact,
+    SeenTile, ShadowScratch, SimdLevel, Tile, TileHits, TileSamples, Visibility, darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
@@ -183,20 +182,19 @@ impl Rayward {
         let grid = self.with_rule(job, job.light, |rule| {
             PointLightGrid::build(job.light, triangles, rule, options, self.level(job))
         });
-        let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
+        let tiles = picture.tiles_mut().map_init(AskingWork::default, |work, out| {
             let tile = eye.tile(out.index);
             eye.trace_tile(&tile, &mut work.hits);
             facets.shade(&work.hits, out.corner, out.stride, out.blocks);
             work.receive(facets, &tile, job);
-            work.keep_those_that_ask();
-            grid.shadowed(&work.receivers, &mut work.shadow_scratch, &mut work.shadow);
-            for (&place, &shadow) in work.places.iter().zip(&work.shadow) {
-                put(&mut work.lit, place, u32::from(!shadow));
+            grid.shadowed(&work.receivers, &mut work.scratch, &mut work.shadow);
+            for (&[block, lane], &shadow) in work.places.iter().zip(&work.shadow) {
+                work.lit[block][lane] = u8::from(!shadow);
             }
             for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
                 darken(block, lit, 1);
             }
-            std::mem::take(&mut work.asking)
+            work.receivers.len() as u64
         });
         tiles.sum()
     }
@@ -220,25 +218,23 @@ impl Rayward {
             let tile = eye.tile(out.index);
             eye.trace_tile(&tile, &mut work.hits);
             facets.shade(&work.hits, out.corner, out.stride, out.blocks);
-            work.receive(facets, &tile, job);
-            let scratch = &mut work.scratch;
-            tree.visible(
-                &work.receivers,
-                &work.pixels,
-                &job.samples,
-                scratch,
-                &mut work.bits,
-            );
-            let bits = work.bits.chunks(job.samples.words());
-            for (&place, bits) in work.places.iter().zip(bits) {
-                let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
+            let seen = SeenTile {
+                view: &job.view,
+                tile,
+                hits: &work.hits,
+            };
+            let asks = |prim: u32| facets.facet(prim) > 0.0;
+            let set_of = |[x, y]: [u32; 2]| sample_set(x, y);
+            let memory = (&mut work.scratch, &mut work.lit);
+            tree.visible_pixels(&seen, &asks, &set_of, &job.samples, memory);
+            let mut asking = 0;
+            for (i, block) in out.blocks.iter_mut().enumerate() {
                 // The share of all samples as so many of the usual number.
-                put(&mut work.lit, place, count * SOFT_SAMPLES / job.samples.count());
+                let share = |seen: u16| (u32::from(seen) * SOFT_SAMPLES / job.samples.count()) as u8;
+                darken(block, &work.lit.counts(i).map(share), SOFT_SAMPLES as u8);
+                asking += u64::from(work.lit.asked(i).count_ones());
             }
-            for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
-                darken(block, lit, SOFT_SAMPLES as u8);
-            }
-            std::mem::take(&mut work.asking) * u64::from(job.samples.count())
+            asking * u64::from(job.samples.count())
         });
         tiles.sum()
     }
@@ -271,143 +267,77 @@ fn draw_followed(
 ) -> u64 {
     let center = job.area_center().as_dvec3();
     let grids = PerspectiveGrids::build(center, job.scene.triangles(), options);
-    let tiles = picture.tiles_mut().map_init(SoftWork::default, |work, out| {
+    let tiles = picture.tiles_mut().map_init(AskingWork::default, |work, out| {
         let tile = eye.tile(out.index);
         eye.trace_tile(&tile, &mut work.hits);
         facets.shade(&work.hits, out.corner, out.stride, out.blocks);
         work.receive(facets, &tile, job);
         let asked = work.places.iter().zip(&work.receivers).zip(&work.pixels);
-        for ((&place, receiver), &pixel) in asked.filter(|((place, _), _)| **place != NOWHERE) {
+        for ((&[block, lane], receiver), &pixel) in asked {
             let lit = |&k: &u32| {
                 let end = job.area.sample(&job.samples, pixel, receiver.point, k);
                 job.area.shines_at(receiver.point) && !grids.shadows(receiver, &end, &mut ())
             };
             let count = (0..job.samples.count()).filter(lit).count() as u32;
-            put(&mut work.lit, place, count * SOFT_SAMPLES / job.samples.count());
+            work.lit[block][lane] = (count * SOFT_SAMPLES / job.samples.count()) as u8;
         }
         for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
             darken(block, lit, SOFT_SAMPLES as u8);
         }
-        std::mem::take(&mut work.asking) * u64::from(job.samples.count())
+        work.receivers.len() as u64 * u64::from(job.samples.count())
     });
     tiles.sum()
-}
-
-/// Notes how much light a place gets.
-#[inline]
-fn put(lit: &mut [[u8; BLOCK_LANES]], place: u16, count: u32) {
-    if place != NOWHERE {
-        let place = usize::from(place);
-        lit[place / BLOCK_LANES][place % BLOCK_LANES] = count as u8;
-    }
 }
 
 /// Working memory of a thread for shadows tile by tile.
 #[derive(Default)]
 struct SoftWork {
     hits: TileHits,
-    receivers: Vec<Receiver>,
-    pixels: Vec<u32>,
-    /// Block and lane of each receiver.
-    places: Vec<u16>,
-    bits: Vec<u32>,
     scratch: AreaScratch,
-    shadow_scratch: ShadowScratch,
-    shadow: Vec<bool>,
-    lit: Vec<[u8; BLOCK_LANES]>,
-    /// Receivers so far in the tile that ask.
-    asking: u64,
+    lit: TileSamples,
 }
 
-impl SoftWork {
-    /// The hits of a tile that are turned towards the light, squares of 4 x 4 pixels along a Z-curve. Pixels that do not ask
-    /// keep their places, so that sixteen receivers are a square and 256 a square of squares.
+/// Working memory of a thread for shadows that are asked for receiver by receiver.
+#[derive(Default)]
+struct AskingWork {
+    hits: TileHits,
+    receivers: Vec<Receiver>,
+    /// Sample set of each receiver, its block, and its lane there.
+    pixels: Vec<u32>,
+    places: Vec<[usize; 2]>,
+    scratch: ShadowScratch,
+    shadow: Vec<bool>,
+    /// How much light the pixels of each block get.
+    lit: Vec<[u8; BLOCK_LANES]>,
+}
+
+impl AskingWork {
+    /// The hits of a tile that are turned towards the light.
     fn receive(&mut self, facets: &Facets, tile: &Tile, job: &Job) {
+        let triangles = job.scene.triangles();
+        let (columns, rows) = (tile.width.div_ceil(4), tile.height.div_ceil(4));
         self.receivers.clear();
         self.pixels.clear();
         self.places.clear();
-        let (columns, rows) = (tile.width.div_ceil(4), tile.height.div_ceil(4));
         self.lit.clear();
         self.lit.resize((columns * rows) as usize, [0; BLOCK_LANES]);
-        let mut asking = 0;
-        let side = columns.max(rows).next_power_of_two();
-        for i in 0..side * side {
-            let [column, row] = [i, i >> 1].map(compacted);
-            if column < columns && row < rows {
-                asking += self.receive_block(facets, tile, (job, columns), [column, row]);
-            } else {
-                self.fill_up(BLOCK_LANES);
-            }
-            if i % BLOCKS_TOGETHER == BLOCKS_TOGETHER - 1 {
-                let first = self.receivers.len() - BLOCKS_TOGETHER as usize * BLOCK_LANES;
-                if asking == 0 {
-                    // Nobody in all of these: their places are not needed.
-                    self.receivers.truncate(first);
-                    self.pixels.truncate(first);
-                    self.places.truncate(first);
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let prims = self.hits.block(column, row).prim;
+            for (lane, prim) in prims.into_iter().enumerate() {
+                let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
+                let sees = prim != u32::MAX && x < tile.width && y < tile.height;
+                if !sees || facets.facet(prim) <= 0.0 {
+                    continue;
                 }
-                asking = 0;
-            }
-        }
-    }
-
-    /// Leaves out the places of nobody.
-    fn keep_those_that_ask(&mut self) {
-        let mut places = self.places.iter();
-        self.receivers
-            .retain(|_| places.next().is_some_and(|&place| place != NOWHERE));
-        self.places.retain(|&place| place != NOWHERE);
-    }
-
-    fn fill_up(&mut self, number: usize) {
-        let nobody = Receiver::free(DVec3::NAN);
-        self.receivers.extend(std::iter::repeat_n(nobody, number));
-        self.pixels.extend(std::iter::repeat_n(0, number));
-        self.places.extend(std::iter::repeat_n(NOWHERE, number));
-    }
-
-    /// Adds a square of 4 x 4 pixels; returns how many of them ask.
-    fn receive_block(
-        &mut self,
-        facets: &Facets,
-        tile: &Tile,
-        (job, columns): (&Job, u32),
-        [column, row]: [u32; 2],
-    ) -> usize {
-        let triangles = job.scene.triangles();
-        let block = (row * columns + column) as usize;
-        let mut asking = 0;
-        let prims = self.hits.block(column, row).prim;
-        for (lane, prim) in prims.into_iter().enumerate() {
-            let (x, y) = (column * 4 + lane as u32 % 4, row * 4 + lane as u32 / 4);
-            let sees = prim != u32::MAX && x < tile.width && y < tile.height && facets.facet(prim) > 0.0;
-            let ray = job.view.pixel_ray(tile.x + x, tile.y + y);
-            let hit = sees.then(|| exact::attributes(ray.origin, ray.dir, triangles.corners(prim)));
-            match hit.flatten() {
-                Some(hit) => {
+                let (x, y) = (tile.x + x, tile.y + y);
+                let ray = job.view.pixel_ray(x, y);
+                let hit = exact::attributes(ray.origin, ray.dir, triangles.corners(prim));
+                if let Some(hit) = hit {
                     self.receivers.push(Receiver::along(&ray, hit.t, prim));
-                    self.pixels.push(sample_set(tile.x + x, tile.y + y));
-                    self.places.push((block * BLOCK_LANES + lane) as u16);
-                    asking += 1;
+                    self.pixels.push(sample_set(x, y));
+                    self.places.push([(row * columns + column) as usize, lane]);
                 }
-                None => self.fill_up(1),
             }
         }
-        self.asking += asking as u64;
-        asking
     }
-}
-
-/// The squares of 4 x 4 pixels that are searched for together.
-const BLOCKS_TOGETHER: u32 = 16;
-
-/// The place of nobody.
-const NOWHERE: u16 = u16::MAX;
-
-/// Every other bit of a number below 2^16.
-fn compacted(v: u32) -> u32 {
-    let v = v & 0x5555;
-    let v = (v | v >> 1) & 0x3333;
-    let v = (v | v >> 2) & 0x0f0f;
-    (v | v >> 4) & 0x00ff
 }

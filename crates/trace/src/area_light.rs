@@ -82,6 +82,11 @@ impl AreaLight {
         self.shape == Shape::Sun
     }
 
+    /// Whether its samples lie in a plane, between its half edges on both sides.
+    pub(crate) fn is_flat(&self) -> bool {
+        self.shape != Shape::Sphere
+    }
+
     /// Whether the light stands or shines somewhere at all.
     pub fn is_valid(&self) -> bool {
         let finite = self.center.is_finite() && self.half_u.is_finite() && self.half_v.is_finite();

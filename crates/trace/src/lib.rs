@@ -66,7 +66,7 @@ mod visibility;
 pub use accel::{Accel, BuildStats, Count, Counters};
 pub use area_grid::AreaLightGrid;
 pub use area_light::AreaLight;
-pub use area_tree::{AreaCounts, AreaLightTree, AreaScratch};
+pub use area_tree::{AreaCounts, AreaLightTree, AreaScratch, SeenTile, TileSamples};
 pub use bins::Binning;
 pub use brute::BruteForce;
 pub use bvh::{Bvh, Node as BvhNode};

@@ -125,7 +125,7 @@ impl VisibleTile {
         }
     }
 
-    fn of(tile: Tile, hits: &TileHits) -> Self {
+    pub(crate) fn of(tile: Tile, hits: &TileHits) -> Self {
         let (stride, rows) = (tile.width.div_ceil(BLOCK), tile.height.div_ceil(BLOCK));
         let mut prims = Vec::with_capacity((stride * rows) as usize);
         for row in 0..rows {
@@ -161,9 +161,17 @@ impl VisibleTile {
     /// The ray of a pixel, by block and lane.
     #[inline]
     pub(crate) fn ray(&self, view: &View, block: u32, lane: u32) -> ViewRay {
-        let x = self.tile.x + block % self.stride * BLOCK + lane % BLOCK;
-        let y = self.tile.y + block / self.stride * BLOCK + lane / BLOCK;
+        let [x, y] = self.pixel(block, lane);
         view.pixel_ray(x, y)
+    }
+
+    /// A pixel of the raster, by block and lane.
+    #[inline]
+    pub(crate) fn pixel(&self, block: u32, lane: u32) -> [u32; 2] {
+        [
+            self.tile.x + block % self.stride * BLOCK + lane % BLOCK,
+            self.tile.y + block / self.stride * BLOCK + lane / BLOCK,
+        ]
     }
 
     /// The surface point a pixel sees, by block and lane; `None` if it sees nothing.

@@ -1,8 +1,9 @@
 //! The perspective frames of an area light, and the boxes of triangles in them (HM08 §3, §5.3).
 //!
-//! The center of projection stands a little behind the light, so that all of the light has a depth of 0 or more. A
-//! rectangle or disk needs one frame, for nothing behind its plane sees it and perspective space has no border: its half
-//! space is the whole raster plane. A sphere has the six frames of a cube, the sun a parallel one.
+//! The center of projection stands behind the light by about its size: from a center in its plane all that is near that
+//! plane, a lamp around the light, would reach to infinity and be found by every search. A rectangle or disk needs one
+//! frame, for nothing behind its plane sees it and perspective space has no border: the half space before it is a part of the
+//! raster plane. A sphere has the six frames of a cube, the sun a parallel one.
 //!
 //! A triangle that reaches behind the center's plane, or far to the side, gets a box without an end on that side. No
 //! triangle is clipped away or listed apart.
@@ -33,6 +34,8 @@ pub(super) struct Frame {
     scale: [f64; 2],
     /// Of a cube's face, how far from its pyramid a triangle can still come between a receiver in it and the light.
     reach: Option<f64>,
+    /// What is nearer than this lies behind a flat light.
+    limit: f32,
 }
 
 impl Local {
@@ -54,11 +57,21 @@ impl Local {
         // The power of two that takes it to at most 1.
         let unit = 2f64.powi(-(largest.max(1e-30).log2().floor() as i32) - 1);
         let extent = (3.0 * largest * unit) as f32 * 1.00001;
-        let light = if light.is_sun() {
-            LightBox::new(light.center.to_array(), half.to_array(), 0.0, extent)
+        let (scale, middle, weight) = if light.is_sun() {
+            (1.0, light.center.to_array(), 0.0)
         } else {
-            LightBox::new([0.0; 3], (half * unit as f32).to_array(), 1.0, extent)
+            (unit as f32, [0.0; 3], 1.0)
         };
+        let mut lanes = LightBox::new(middle, (half * scale).to_array(), weight, extent);
+        if light.is_flat() {
+            let edges = [light.half_u, light.half_v];
+            let beside = half - (edges[0].abs() + edges[1].abs());
+            lanes = lanes.flat(
+                edges.map(|edge| (edge * scale).to_array()),
+                beside.max_element() * scale * 1.01,
+            );
+        }
+        let light = lanes;
         Self { origin, unit, light }
     }
 }
@@ -140,16 +153,19 @@ impl Frame {
         };
         // Rounding the center may move it by no more than this.
         let rounding = middle.abs().max_element() * 2f64.powi(-20) + f64::from(f32::MIN_POSITIVE);
-        let center = (middle - forward * (half[2] * 1.001 + rounding)).as_vec3();
+        let behind = if size.is_some() { 0.0 } else { half[0].max(half[1]) };
+        let center = (middle - forward * (half[2] * 1.001 + rounding + behind)).as_vec3();
         let view = plain_view(center, axes, Arrangement::Perspective);
         let offset = middle - center.as_dvec3();
         let (unit, wide) = (local.unit, 1.00001);
+        let depths = [offset.dot(forward) - half[2], offset.dot(forward) + half[2]];
         let lanes = FrameLanes {
             half: [
                 ((half[0] + offset.dot(right).abs()) * unit * wide) as f32,
                 ((half[1] + offset.dot(up).abs()) * unit * wide) as f32,
             ],
-            depth: ((half[2] + offset.dot(forward)) * unit * wide) as f32,
+            near: (depths[0] * unit / wide).max(0.0) as f32,
+            depth: (depths[1] * unit * wide) as f32,
             reach: None,
             ..Self::axes(axes, (center.as_dvec3() - local.origin.as_dvec3()) * unit)
         };
@@ -158,6 +174,11 @@ impl Frame {
             lanes,
             scale: [1.0, 1.0 / unit],
             reach: size.map(|size| 3.0 * (size + rounding)),
+            limit: if size.is_none() && depths[0] > 0.0 {
+                (wide / depths[0]) as f32
+            } else {
+                f32::INFINITY
+            },
         }
     }
 
@@ -186,6 +207,7 @@ impl Frame {
             lanes,
             scale: [unit, unit],
             reach: None,
+            limit: f32::INFINITY,
         }
     }
 
@@ -196,6 +218,7 @@ impl Frame {
             forward: forward.as_vec3().to_array(),
             center: center.as_vec3().to_array(),
             half: [0.0; 2],
+            near: 0.0,
             depth: 0.0,
             reach: None,
         }
@@ -212,7 +235,8 @@ impl Frame {
     ) -> Option<[f32; 6]> {
         let [a, b, c] = triangles.indices[prim as usize].map(|i| &vertices[i as usize]);
         let behind = a.nearness < 0.0 && b.nearness < 0.0 && c.nearness < 0.0;
-        if behind {
+        let beyond = a.nearness > self.limit && b.nearness > self.limit && c.nearness > self.limit;
+        if behind || beyond {
             return None;
         }
         let bounds = if a.nearness > 0.0 && b.nearness > 0.0 && c.nearness > 0.0 {
@@ -237,7 +261,8 @@ impl Frame {
             let v = v * self.scale[0] as f32;
             (v + side * (v.abs() * 2.0 * f32::EPSILON + 1e-37)).clamp(-FAR, FAR)
         };
-        let nearest = (f64::from(bounds[4]) * self.scale[1]) as f32 * (1.0 + 4.0 * f32::EPSILON);
+        let nearest =
+            (f64::from(bounds[4].min(self.limit)) * self.scale[1]) as f32 * (1.0 + 4.0 * f32::EPSILON);
         let farthest = (f64::from(bounds[5]) * self.scale[1]) as f32;
         Some([
             wider(bounds[0], -1.0),

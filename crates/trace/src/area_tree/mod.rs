@@ -7,8 +7,8 @@
 //! receivers; where there are none, receivers are lit without a sample having been made. The rest is culled
 //! against the shaft of each 64 receivers, which may show that they are dark as a whole ([`crate::kernel::cover`]), and
 //! tested for each sixteen: a triangle against one sample of each, of those samples whose bundle of rays meets its box
-//! ([`crate::kernel::bundles`], [`crate::kernel::lines`]). Samples that are decided are not tested again, and a batch of which
-//! nothing is seen any more is done.
+//! ([`crate::kernel::bundles`], [`crate::kernel::lines`]). Samples that are decided are not tested again. Pixels of a tile are
+//! receivers made in lanes ([`TileSamples`]); any receivers may be asked for one by one ([`AreaLightTree::visible`]).
 //!
 //! Answers: exactly those of [`crate::BruteForce::visible_samples`], bit for bit. Kernels filter with error bounds;
 //! pairs within them are decided by [`crate::exact`].
@@ -19,6 +19,7 @@
 
 mod build;
 mod frame;
+mod pixels;
 
 use glam::DVec3;
 
@@ -31,6 +32,7 @@ use crate::light_grid::CastRule;
 use crate::{AreaLight, Light, Receiver, Samples, Topology, Triangles, exact};
 use build::{MOST_TRIANGLES, Order, Ranges};
 use frame::{Frame, Local};
+pub use pixels::{SeenTile, TileSamples};
 
 /// Coordinates beyond this are not put into a tree.
 const LARGEST: f64 = 1e30;
@@ -177,9 +179,6 @@ impl<'a> AreaLightTree<'a> {
         assert_eq!(receivers.len(), pixels.len(), "a pixel for each receiver");
         bits.clear();
         bits.resize(receivers.len() * samples.words(), 0);
-        let asking = receivers.iter().filter(|r| r.point.is_finite()).count() as u64;
-        scratch.counts.receivers += asking;
-        scratch.counts.samples += asking * u64::from(samples.count());
         let blocks = receivers.chunks(BLOCK).zip(pixels.chunks(BLOCK));
         for ((receivers, pixels), bits) in blocks.zip(bits.chunks_mut(BLOCK * samples.words())) {
             self.block(receivers, pixels, samples, scratch, bits);
@@ -195,41 +194,35 @@ impl<'a> AreaLightTree<'a> {
         bits: &mut [u32],
     ) {
         let work = &mut scratch.work;
-        let (mut near, mut far) = ([0u32; BATCHES], [0u32; BATCHES]);
+        let mut asking = Asking::default();
         let batches = || receivers.chunks(LANES).zip(pixels.chunks(LANES)).enumerate();
         for (batch, (receivers, pixels)) in batches() {
             for (lane, receiver) in receivers.iter().enumerate() {
+                if !receiver.point.is_finite() {
+                    continue;
+                }
+                asking.all[batch] |= 1 << lane;
                 if self.light.shines_at(receiver.point) {
                     let fits = match &self.local {
                         Some(local) => place(&self.light, local, receiver, [batch, lane], work),
                         None => self.unsorted.is_empty(),
                     };
-                    let lanes = if fits { &mut near } else { &mut far };
+                    let lanes = if fits { &mut asking.near } else { &mut asking.far };
                     lanes[batch] |= 1 << lane;
                 }
             }
             work.askers[batch].pixel[..pixels.len()].copy_from_slice(pixels);
-            let answers = &mut work.answers[batch];
-            answers.unsure.clear();
-            answers.open.clear();
-            answers
-                .open
-                .resize(samples.count() as usize, near[batch] | far[batch]);
         }
-        let asked = self.ask(receivers, samples, near, work);
-        for (batch, (receivers, pixels)) in batches() {
-            let answers = &mut work.answers[batch];
-            scratch.counts.exact_pairs += self.resolve(receivers, pixels, samples, answers);
-            if far[batch] != 0 {
-                self.test_all(receivers, pixels, samples, far[batch], &mut answers.open);
-            }
-            let tested = far[batch] | if asked & (1 << batch) == 0 { 0 } else { near[batch] };
-            let asking = receivers.iter().filter(|r| r.point.is_finite()).count() as u64;
-            let untested = asking - u64::from(tested.count_ones());
-            scratch.counts.untested += untested * u64::from(samples.count());
+        self.answer(
+            &asking,
+            samples,
+            &|batch, lane| receivers[batch * LANES + lane],
+            scratch,
+        );
+        for (batch, _) in batches() {
             let words = samples.words();
             let bits = &mut bits[batch * LANES * words..];
-            for (k, &open) in answers.open.iter().enumerate() {
+            for (k, &open) in scratch.work.answers[batch].open.iter().enumerate() {
                 let mut open = open;
                 while open != 0 {
                     bits[open.trailing_zeros() as usize * words + k / 32] |= 1 << (k % 32);
@@ -237,20 +230,53 @@ impl<'a> AreaLightTree<'a> {
                 }
             }
         }
-        scratch.counts.nodes += std::mem::take(&mut work.nodes);
-        scratch.counts.tests += std::mem::take(&mut work.tests);
-        scratch.counts.covered += std::mem::take(&mut work.covered);
+    }
+
+    /// Answers for receivers that are in lanes: which samples of each are seen, in the block's work. `receiver` gives one by
+    /// batch and lane.
+    fn answer(
+        &self,
+        asking: &Asking,
+        samples: &Samples,
+        receiver: &dyn Fn(usize, usize) -> Receiver,
+        scratch: &mut AreaScratch,
+    ) {
+        let Asking { all, near, far } = asking;
+        let work = &mut scratch.work;
+        for (batch, answers) in work.answers.iter_mut().enumerate() {
+            answers.unsure.clear();
+            answers.open.clear();
+            answers
+                .open
+                .resize(samples.count() as usize, near[batch] | far[batch]);
+        }
+        let asked = self.ask(samples, *near, work);
+        let counts = &mut scratch.counts;
+        for (batch, answers) in work.answers.iter_mut().enumerate() {
+            if all[batch] == 0 {
+                continue;
+            }
+            let pixels = &work.askers[batch].pixel;
+            let receiver = |lane: usize| receiver(batch, lane);
+            counts.exact_pairs += self.resolve(&receiver, pixels, samples, answers);
+            if far[batch] != 0 {
+                self.test_all(&receiver, pixels, samples, far[batch], &mut answers.open);
+            }
+            let tested = far[batch] | if asked & (1 << batch) == 0 { 0 } else { near[batch] };
+            let [asking, tested] = [all[batch], tested].map(|lanes| u64::from(lanes.count_ones()));
+            let samples = u64::from(samples.count());
+            counts.receivers += asking;
+            counts.samples += asking * samples;
+            counts.untested += (asking - tested) * samples;
+        }
+        counts.nodes += std::mem::take(&mut work.nodes);
+        counts.tests += std::mem::take(&mut work.tests);
+        counts.covered += std::mem::take(&mut work.covered);
     }
 
     /// Has the kernels close what they can of the receivers `near`; returns a bit for each batch in which there was
     /// something to test.
-    fn ask(
-        &self,
-        receivers: &[Receiver],
-        samples: &Samples,
-        near: [u32; BATCHES],
-        work: &mut BlockWork,
-    ) -> u32 {
+    fn ask(&self, samples: &Samples, near: [u32; BATCHES], work: &mut BlockWork) -> u32 {
         let Some(local) = &self.local else { return 0 };
         let light = LightLanes {
             light: &self.light,
@@ -266,8 +292,8 @@ impl<'a> AreaLightTree<'a> {
         for (index, face) in self.faces.iter().enumerate() {
             let mut lanes = near;
             if self.faces.len() > 1 {
-                for (lanes, receivers) in lanes.iter_mut().zip(receivers.chunks(LANES)) {
-                    *lanes = self.lanes_of(index, receivers, *lanes);
+                for (lanes, askers) in lanes.iter_mut().zip(&work.askers) {
+                    *lanes = lanes_of(index, &askers.offset, *lanes);
                 }
             }
             if lanes != [0; BATCHES] && !face.groups.is_empty() {
@@ -283,22 +309,11 @@ impl<'a> AreaLightTree<'a> {
         asked
     }
 
-    /// Those of the lanes whose receivers are in a face of the cube.
-    fn lanes_of(&self, face: usize, receivers: &[Receiver], lanes: u32) -> u32 {
-        let center = self.light.center.as_dvec3();
-        let within = |lane: &usize| {
-            lanes & (1 << lane) != 0 && frame::face_of(receivers[*lane].point - center) == face
-        };
-        (0..receivers.len())
-            .filter(within)
-            .fold(0, |bits, lane| bits | 1 << lane)
-    }
-
     /// Decides the unsure pairs; returns how many were left to decide.
     fn resolve(
         &self,
-        receivers: &[Receiver],
-        pixels: &[u32],
+        receiver: &dyn Fn(usize) -> Receiver,
+        pixels: &[u32; LANES],
         samples: &Samples,
         answers: &mut Answers,
     ) -> u64 {
@@ -309,11 +324,11 @@ impl<'a> AreaLightTree<'a> {
                 continue;
             }
             decided += 1;
-            let receiver = &receivers[lane];
+            let receiver = receiver(lane);
             let end = self
                 .light
                 .sample(samples, pixels[lane], receiver.point, unsure.sample);
-            if exact::shadows(&self.triangles, unsure.prim, receiver, &end) {
+            if exact::shadows(&self.triangles, unsure.prim, &receiver, &end) {
                 *open &= !(1 << lane);
             }
         }
@@ -323,20 +338,17 @@ impl<'a> AreaLightTree<'a> {
     /// Tests receivers exactly against every caster.
     fn test_all(
         &self,
-        receivers: &[Receiver],
-        pixels: &[u32],
+        receiver: &dyn Fn(usize) -> Receiver,
+        pixels: &[u32; LANES],
         samples: &Samples,
         lanes: u32,
         open: &mut [u32],
     ) {
-        for (lane, receiver) in receivers
-            .iter()
-            .enumerate()
-            .filter(|(lane, _)| lanes & (1 << lane) != 0)
-        {
+        for lane in (0..LANES).filter(|lane| lanes & (1 << lane) != 0) {
+            let receiver = receiver(lane);
             for (k, open) in open.iter_mut().enumerate() {
                 let end: Light = self.light.sample(samples, pixels[lane], receiver.point, k as u32);
-                let hides = |prim: u32| exact::shadows(&self.triangles, prim, receiver, &end);
+                let hides = |prim: u32| exact::shadows(&self.triangles, prim, &receiver, &end);
                 let in_trees = self.faces.iter().flat_map(Face::prims);
                 if self.unsorted.iter().copied().chain(in_trees).any(hides) {
                     *open &= !(1 << lane);
@@ -344,6 +356,27 @@ impl<'a> AreaLightTree<'a> {
             }
         }
     }
+}
+
+/// The receivers of a block, a bit each, by batch.
+#[derive(Clone, Copy, Debug, Default)]
+struct Asking {
+    /// All.
+    all: [u32; BATCHES],
+    /// Those that the light shines at and that are in lanes.
+    near: [u32; BATCHES],
+    /// Those that the light shines at and that are too far off for that.
+    far: [u32; BATCHES],
+}
+
+/// Those of the lanes whose receivers are in a face of the cube. Neighbouring faces overlap by more than rounding of these
+/// offsets does.
+fn lanes_of(face: usize, offset: &[[f32; LANES]; 3], lanes: u32) -> u32 {
+    let within = |lane: &usize| {
+        let from = DVec3::from(offset.map(|v| f64::from(v[*lane])));
+        lanes & (1 << lane) != 0 && frame::face_of(from) == face
+    };
+    (0..LANES).filter(within).fold(0, |bits, lane| bits | 1 << lane)
 }
 
 /// Puts a receiver into a lane; `false` if it is too far off for f32.

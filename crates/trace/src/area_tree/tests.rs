@@ -389,3 +389,62 @@ fn a_triangle_that_does_not_cast_is_a_gap() {
     tree.visible(&receivers, &pixels, &samples, &mut scratch, &mut bits);
     assert!(scratch.counts.covered == 0 && bits.iter().any(|&b| b != 0));
 }
+
+#[test]
+fn a_sheet_that_hides_the_light_from_some_is_no_sheet_for_others() {
+    // A square of receivers around an edge: three batches in one place, and one far below and aside, which a hole in the
+    // same sheet lets see the light. What lies between the two is met by no ray of either.
+    let mut mesh = Mesh::default();
+    let at = |i: i32, j: i32| Vec3::new(i as f32 * 0.1, 1.0, j as f32 * 0.1);
+    for (i, j) in (-60..60).flat_map(|i| (-60..60).map(move |j| (i, j))) {
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+        if !((30..36).contains(&i) && (-3..3).contains(&j)) {
+            mesh.triangle([a, b, c]);
+            mesh.triangle([a, c, d]);
+        }
+    }
+    let mut numbers = Numbers(3);
+    let light = AreaLight::rectangle(Vec3::Y * 2.0, Vec3::X * 0.05, Vec3::Z * 0.05);
+    for depth in [0.0, -8.0] {
+        // Below the middle of the hole, on the line that goes through it from the light.
+        let seeing = Vec3::new(3.3 * (2.0 - depth), depth, 0.0);
+        let mut place = |i: usize| {
+            let at = if i % 64 < 48 {
+                Vec3::new(-0.5, 0.5, 0.0)
+            } else {
+                seeing
+            };
+            Receiver::free((at + numbers.point() * 0.05).as_dvec3())
+        };
+        let receivers: Vec<_> = (0..64).map(&mut place).collect();
+        let counts = check("hole", &mesh, &receivers, light, 8);
+        assert!(counts.tests > 0, "{counts:?}");
+        let tree = AreaLightTree::build(light, mesh.triangles(), &|_| Casts::Both, SimdLevel::detect());
+        let mut bits = Vec::new();
+        let (samples, mut scratch) = (Samples::new(8, 7), AreaScratch::default());
+        tree.visible(&receivers, &[1; 64], &samples, &mut scratch, &mut bits);
+        assert!(bits[..48].iter().all(|&b| b == 0) && bits[48..].iter().any(|&b| b != 0));
+    }
+}
+
+#[test]
+fn light_passes_beside_the_fold_of_a_sheet() {
+    // At the fold two triangles share an edge, but lie on the same side of it.
+    let mut mesh = Mesh::default();
+    let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let [a, b] = [at(-1.0, 0.5, -1.0), at(-1.0, 0.5, 1.0)];
+    let [c, d] = [at(0.02, 0.5, 1.0), at(0.02, 0.5, -1.0)];
+    let [e, f] = [at(-1.0, 0.45, -1.0), at(-1.0, 0.45, 1.0)];
+    for corners in [[a, b, c], [a, c, d], [d, c, f], [d, f, e]] {
+        mesh.triangle(corners);
+    }
+    let (_, receivers, light) = under_a_sheet();
+    check("fold", &mesh, &receivers, light, 8);
+    let samples = Samples::new(8, 7);
+    let brute = BruteForce::new(mesh.triangles());
+    let seen = receivers
+        .iter()
+        .map(|r| brute.visible_samples(r, &light, &samples, 1)[0].count_ones());
+    let seen: u32 = seen.sum();
+    assert!(seen > 500 && seen < 3500, "{seen}");
+}

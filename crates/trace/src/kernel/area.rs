@@ -3,20 +3,22 @@
 //! One call is one `dispatch!`, for up to sixteen batches of sixteen receivers, four to a square. The tree is searched by
 //! boxes once for all of them. What is found is held against the box and the shaft of each square and copied
 //! together; that may show that all is dark, because one triangle hides the whole light, or many that hang together
-//! ([`super::cover`]). What is left is tested for each batch, where its box is met by some receiver's rays, and with those
-//! samples alone whose bundle of rays meets it ([`super::bundles`]). Samples are made only once a triangle needs
-//! them, so a batch that is certainly lit costs its share of the search.
+//! ([`super::cover`]). What is left is held against each batch and, by box and plane, against each of its receivers. A few
+//! triangles are then held against all of the light, which may leave no sample in question; else samples are made, and each
+//! bundle of rays ([`super::bundles`]) is tested against the triangles whose boxes it meets, until none of its samples is
+//! seen. Samples are made only once a triangle needs them, so a batch that is certainly lit costs its share of the search.
+//!
+//! Around the edge of something receivers lie apart. Near and far ones of a batch are then tested one after the other, and a
+//! square's triangles are those that some batch's rays may meet.
 
 use std::ops::Range;
 
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 
-use super::bundles::{Bundles, WIDTH};
+use super::bundles::bundles;
 use super::cover::{Found, Sheets, Surfaces};
 use super::light_points::{Askers, SamplePoints, light_points};
-use super::lines::{
-    Answers, Candidate, CornerLanes, EdgeSides, Group, LightBox, ReceiverLanes, Unsure, set_up,
-};
+use super::lines::{Answers, CornerLanes, Group, LightBox, Rays, ReceiverLanes, Unsure, set_up};
 use super::shaft::{
     Bounds, Boxes, FrameLanes, Places, Reach, ReceiverBox, Search, culled, overlapped, surface_axes,
 };
@@ -55,9 +57,9 @@ pub(crate) struct BlockWork {
     pub(crate) askers: [Askers; BATCHES],
     pub(crate) answers: [Answers; BATCHES],
     points: SamplePoints,
-    bundles: Bundles,
-    /// For each slot, the receivers that still see their sample.
-    open: Vec<u32>,
+    bundles: Vec<Search>,
+    rays: Rays,
+    met: Met,
     stack: Vec<(u32, u32)>,
     bounds: [Bounds; BATCHES],
     /// Groups of the tree whose boxes the block's rays may meet, and which of them.
@@ -112,14 +114,36 @@ fn query_impl<S: Simd>(
             Findings::Darkness => asked |= close(square, &active, work),
             Findings::Triangles => {
                 for batch in square.filter(|&batch| active[batch] != 0) {
-                    if test_batch(simd, (tree, light), batch, active[batch], work) {
-                        asked |= 1 << batch;
+                    let parts = parts(simd, tree, batch, active[batch], work);
+                    for (lanes, bounds) in parts.into_iter().filter(|part| part.0 != 0) {
+                        if test_batch(simd, (tree, light), (batch, &bounds), lanes, work) {
+                            asked |= 1 << batch;
+                        }
                     }
                 }
             }
         }
     }
     asked
+}
+
+/// The receivers `active` of a batch, or the near and the far ones of those that lie apart, with their bounds.
+#[inline(always)]
+fn parts<S: Simd>(
+    simd: S,
+    tree: &TreeLanes,
+    batch: usize,
+    active: u32,
+    work: &BlockWork,
+) -> [(u32, Bounds); 2] {
+    let bounds = work.bounds[batch];
+    if bounds.are_close() {
+        return [(active, bounds), (0, Bounds::NONE)];
+    }
+    let places = Places::of(simd, tree.frame, &work.receivers[batch]);
+    let near = places.nearer(simd, (bounds.depth[0] * bounds.depth[1]).sqrt()) & active;
+    let far = active & !near;
+    [(near, places.bounds(simd, near)), (far, places.bounds(simd, far))]
 }
 
 /// What was found between some receivers and the light.
@@ -135,8 +159,7 @@ enum Findings {
 fn close(batches: Range<usize>, active: &[u32; BATCHES], work: &mut BlockWork) -> u32 {
     let mut asked = 0;
     for batch in batches.filter(|&batch| active[batch] != 0) {
-        let open = &mut work.answers[batch].open;
-        open.iter_mut().for_each(|open| *open &= !active[batch]);
+        close_lanes(active[batch], &mut work.answers[batch]);
         work.covered += u64::from(active[batch].count_ones());
         asked |= 1 << batch;
     }
@@ -192,13 +215,26 @@ fn narrow<S: Simd>(
     active: &[u32; BATCHES],
     work: &mut BlockWork,
 ) -> Findings {
-    let search = Search::new(tree.frame, &bounds_of(square.clone(), work));
+    let bounds = bounds_of(square.clone(), work);
+    let search = Search::new(tree.frame, &bounds);
+    // Around the edge of something its receivers lie apart, with much between them that no ray of theirs meets. What is left
+    // then says nothing of sheets, for the rays of each batch alone are not connected with those of the others.
+    let apart = !bounds.are_close();
+    let of_batch = |batch: usize| Search::new(tree.frame, &work.bounds[square.start + batch]);
+    let batches: [Search; SQUARE] = std::array::from_fn(of_batch);
     let shape = box_of(simd, square, active, work);
     let found = &mut work.found;
     found.clear();
     for &(index, lanes) in &work.leaves {
         let boxes = &tree.levels[0][index as usize];
-        let hit = overlapped(simd, boxes, &search) & lanes;
+        let mut hit = overlapped(simd, boxes, &search) & lanes;
+        if apart && hit != 0 {
+            let mut met = 0;
+            for batch in &batches {
+                met |= overlapped(simd, boxes, batch);
+            }
+            hit &= met;
+        }
         if hit == 0 {
             continue;
         }
@@ -217,6 +253,9 @@ fn narrow<S: Simd>(
     if found.count() == 0 {
         return Findings::Nothing;
     }
+    if apart {
+        return Findings::Triangles;
+    }
     work.sheets.locate(&tree.surfaces, found);
     if work.sheets.hide(&tree.surfaces, found) {
         Findings::Darkness
@@ -230,125 +269,176 @@ fn narrow<S: Simd>(
 fn test_batch<S: Simd>(
     simd: S,
     (tree, light): (&TreeLanes, &LightLanes),
-    batch: usize,
+    (batch, bounds): (usize, &Bounds),
     active: u32,
     work: &mut BlockWork,
 ) -> bool {
-    let bounds = work.bounds[batch];
-    let search = Search::new(tree.frame, &bounds);
-    let receivers = &work.receivers[batch];
-    let places = Places::of(simd, tree.frame, receivers);
+    let search = Search::new(tree.frame, bounds);
+    let places = Places::of(simd, tree.frame, &work.receivers[batch]);
     let reach = Reach::new(simd, tree.frame, &places);
-    let (mut asked, mut left) = (false, active);
+    work.met.clear();
     for i in 0..work.found.count().div_ceil(LANES) {
-        let boxes = &work.found.boxes[i];
-        let mut hit = overlapped(simd, boxes, &search) & work.found.lanes(i);
+        let hit = overlapped(simd, &work.found.boxes[i], &search) & work.found.lanes(i);
+        meet(simd, tree.groups, (&reach, i, hit), (batch, active), work);
+    }
+    if work.met.lanes.is_empty() {
+        return false;
+    }
+    let mut left = active;
+    if work.met.lanes.len() <= FEW {
+        let [mixed, covered] = over_light(simd, light, batch, work);
+        left &= !covered;
+        if mixed & left == 0 {
+            close_lanes(covered, &mut work.answers[batch]);
+            return true;
+        }
+    }
+    let (points, askers) = (&mut work.points, &work.askers[batch]);
+    light_points(simd, light.light, light.samples, askers, light.unit, points);
+    let rays = (tree.frame, light.light_box);
+    bundles(simd, rays, &places, points, (left, &search), &mut work.bundles);
+    for slot in 0..work.bundles.len() {
+        test_slot(simd, light, (batch, slot), left, work);
+    }
+    close_lanes(active & !left, &mut work.answers[batch]);
+    true
+}
+
+/// Triangles up to which a batch is held against each for all of the light, before any sample is made.
+const FEW: usize = 4;
+
+/// Triangles that may come between the receivers of a batch and the light.
+#[derive(Clone, Debug, Default)]
+struct Met {
+    /// Their boxes, sixteen together.
+    boxes: Vec<Boxes>,
+    /// Where each is among those found for the square.
+    found: Vec<u32>,
+    /// The receivers in question.
+    lanes: Vec<u32>,
+}
+
+impl Met {
+    fn clear(&mut self) {
+        self.found.clear();
+        self.lanes.clear();
+    }
+
+    #[inline(always)]
+    fn push(&mut self, extent: [f32; 6], found: usize, lanes: u32) {
+        let (to, at) = (self.lanes.len() / LANES, self.lanes.len() % LANES);
+        if to == self.boxes.len() {
+            self.boxes.push(Boxes::default());
+        }
+        self.boxes[to].set(at, extent);
+        self.found.push(found as u32);
+        self.lanes.push(lanes);
+    }
+}
+
+/// Adds those of sixteen triangles that were found to those met: some receiver's rays meet the box, and it is not before
+/// the triangle.
+#[inline(always)]
+fn meet<S: Simd>(
+    simd: S,
+    groups: &[Group],
+    (reach, i, hit): (&Reach<S>, usize, u32),
+    (batch, active): (usize, u32),
+    work: &mut BlockWork,
+) {
+    let mut hit = hit;
+    while hit != 0 {
+        let lane = hit.trailing_zeros() as usize;
+        hit &= hit - 1;
+        let extent = work.found.boxes[i].get(lane);
+        let lanes = reach.meets(simd, extent) & active;
+        if lanes == 0 {
+            continue;
+        }
+        let record = work.found.record(groups, i * LANES + lane);
+        let [lanes, _] = record.before(simd, &work.receivers[batch], lanes);
+        if lanes != 0 {
+            work.met.push(extent, i * LANES + lane, lanes);
+        }
+    }
+}
+
+/// Of a batch, those receivers of which the triangles that were met leave samples in question, and those from which one of
+/// them hides all of the light.
+#[inline(always)]
+fn over_light<S: Simd>(simd: S, light: &LightLanes, batch: usize, work: &BlockWork) -> [u32; 2] {
+    let receivers = &work.receivers[batch];
+    let size = f32x16::from_slice(simd, &receivers.size);
+    let bound = f32x16::from_slice(simd, &receivers.edge_error) * f32x16::splat(simd, 2.0)
+        + light.light_box.slacks(simd, size);
+    let [mut mixed, mut covered] = [0; 2];
+    for (&found, &lanes) in work.met.found.iter().zip(&work.met.lanes) {
+        let record = work.found.copied(found as usize);
+        let [some, all] = record.over_light(simd, receivers, (light.light_box, bound), lanes);
+        mixed |= some;
+        covered |= all;
+    }
+    [mixed, covered]
+}
+
+/// Tests the bundle of a slot, from the receivers `active`, against those triangles whose boxes it meets.
+#[inline(always)]
+fn test_slot<S: Simd>(
+    simd: S,
+    light: &LightLanes,
+    (batch, slot): (usize, usize),
+    active: u32,
+    work: &mut BlockWork,
+) {
+    let (receivers, answers) = (&work.receivers[batch], &mut work.answers[batch]);
+    let all = work.points.lanes[slot] & active;
+    let (mut open, sample) = (all, &work.points.sample[slot]);
+    if all == 0 {
+        return;
+    }
+    let rays = &mut work.rays;
+    rays.set(simd, receivers, light.light_box, &work.points.offsets[slot]);
+    let met = &work.met;
+    for (i, lanes) in met.lanes.chunks(LANES).enumerate() {
+        let mut hit = overlapped(simd, &met.boxes[i], &work.bundles[slot]);
+        hit &= u32::MAX >> (32 - lanes.len());
         while hit != 0 {
             let lane = hit.trailing_zeros() as usize;
             hit &= hit - 1;
-            let extent = boxes.get(lane);
-            let lanes = reach.meets(simd, extent) & left;
-            if lanes == 0 {
+            let asking = open & lanes[lane];
+            if asking == 0 {
                 continue;
             }
-            let (group, place) = work.found.places[i * LANES + lane];
-            let (group, place) = (&tree.groups[group as usize], place as usize);
-            let candidate = Candidate::new(simd, receivers, group, place, light.light_box, lanes);
-            let Some(candidate) = candidate else { continue };
-            if !asked {
-                asked = true;
-                let (points, askers) = (&mut work.points, &work.askers[batch]);
-                light_points(simd, light.light, light.samples, askers, light.unit, points);
-                let rays = (tree.frame, light.light_box);
-                work.bundles.set(simd, rays, &places, points, (active, &bounds));
-                work.open.clear();
-                work.open.extend(points.lanes.iter().map(|lanes| lanes & active));
+            work.tests += 1;
+            let record = work.found.copied(met.found[i * LANES + lane] as usize);
+            let [sure, mut perhaps] = record.hides(simd, receivers, light.light_box, rays, asking);
+            open &= !sure;
+            while perhaps != 0 {
+                let lane = perhaps.trailing_zeros();
+                perhaps &= perhaps - 1;
+                answers.unsure.push(Unsure {
+                    sample: u32::from(sample[lane as usize]),
+                    lane,
+                    prim: record.prim,
+                });
             }
-            let test = BundleTest {
-                receivers,
-                light_box: light.light_box,
-                points: &work.points,
-                bundles: &work.bundles,
-            };
-            let (open, unsure) = (&mut work.open, &mut work.answers[batch].unsure);
-            work.tests += test.test(simd, &candidate, (group, place, extent), open, unsure);
         }
-        if asked && i % 4 == 3 {
-            left = work.open.iter().fold(0, |all, open| all | open);
-            if left == 0 {
-                break;
-            }
+        if open == 0 {
+            break;
         }
     }
-    if asked {
-        close_slots(active, &work.points, &work.open, &mut work.answers[batch]);
-    }
-    asked
-}
-
-/// What a triangle is tested against.
-struct BundleTest<'w> {
-    receivers: &'w ReceiverLanes,
-    light_box: &'w LightBox,
-    points: &'w SamplePoints,
-    bundles: &'w Bundles,
-}
-
-impl BundleTest<'_> {
-    /// Closes the samples that a triangle certainly hides, and notes unsure ones; returns the bundles tested.
-    #[inline(always)]
-    fn test<S: Simd>(
-        &self,
-        simd: S,
-        candidate: &Candidate,
-        (group, lane, extent): (&Group, usize, [f32; 6]),
-        open: &mut [u32],
-        unsure: &mut Vec<Unsure>,
-    ) -> u64 {
-        let mut tests = 0;
-        let mut sides: Option<EdgeSides<S>> = None;
-        for eight in 0..open.len().div_ceil(WIDTH) {
-            let mut met = self.bundles.met(simd, eight, extent);
-            while met != 0 {
-                let slot = eight * WIDTH + met.trailing_zeros() as usize;
-                met &= met - 1;
-                if slot >= open.len() || open[slot] & candidate.lanes == 0 {
-                    continue;
-                }
-                tests += 1;
-                if sides.is_none() {
-                    let (receivers, light) = (self.receivers, self.light_box);
-                    sides = Some(EdgeSides::new(simd, receivers, group, lane, light));
-                }
-                let Some(sides) = &sides else { continue };
-                let d = &self.points.offsets[slot];
-                let [sure, perhaps] = candidate.hides(simd, self.receivers, self.light_box, sides, d);
-                open[slot] &= !sure;
-                let mut perhaps = perhaps & open[slot];
-                while perhaps != 0 {
-                    let lane = perhaps.trailing_zeros();
-                    perhaps &= perhaps - 1;
-                    unsure.push(Unsure {
-                        sample: u32::from(self.points.sample[slot][lane as usize]),
-                        lane,
-                        prim: candidate.prim,
-                    });
-                }
-            }
-        }
-        tests
+    let mut closed = all & !open;
+    while closed != 0 {
+        let lane = closed.trailing_zeros() as usize;
+        closed &= closed - 1;
+        answers.open[usize::from(sample[lane])] &= !(1 << lane);
     }
 }
 
-/// From slots to samples.
-fn close_slots(active: u32, points: &SamplePoints, open: &[u32], answers: &mut Answers) {
-    for ((open, lanes), sample) in open.iter().zip(&points.lanes).zip(&points.sample) {
-        let mut closed = lanes & active & !open;
-        while closed != 0 {
-            let lane = closed.trailing_zeros() as usize;
-            closed &= closed - 1;
-            answers.open[usize::from(sample[lane])] &= !(1 << lane);
-        }
+/// Closes all samples of these receivers.
+fn close_lanes(lanes: u32, answers: &mut Answers) {
+    if lanes != 0 {
+        answers.open.iter_mut().for_each(|open| *open &= !lanes);
     }
 }
 

@@ -3,115 +3,38 @@
 //! In a light's perspective space ([`super::shaft`]) the ray from a receiver at X0 with nearness w to a sample at (s, u) is
 //! X(n) = X0 + S (n - w) with the slope S = (s - u X0) pz / (pz - u). Of sixteen neighbours with samples of one slot
 //! ([`super::light_points`]) neither X0 nor S differs by much, while all slots together spread over the light. So a triangle
-//! meets few of the bundles of a batch, and which is told from its box for eight bundles at once.
+//! meets few of the bundles of a batch. A bundle is searched for like the rays of many receivers, with slopes of its own.
 //!
 //! Errors: slopes are intervals that hold what rounding of samples, receivers and these operations may do; where an interval would
-//! be no use, it has no end. Cost: some 60 operations a slot, 25 a triangle and eight slots.
+//! be no use, it has no end. Cost: some 60 operations a slot, 15 for sixteen triangles and a slot.
 
-use fearless_simd::{Simd, f32x8, f32x16, prelude::*};
+use fearless_simd::{Simd, f32x16, prelude::*};
 
 use super::light_points::SamplePoints;
-use super::lines::{LightBox, each3, load3};
-use super::shaft::{Bounds, FAR, FrameLanes, Places, mask_of, plain};
+use super::lines::LightBox;
+use super::shaft::{FAR, FrameLanes, Places, Search, mask_of, plain, range_of};
+use super::{load3, splat3};
 
-/// Bundles told apart at once.
-pub(crate) const WIDTH: usize = 8;
-
-/// Smallest and largest slopes of eight bundles.
-#[derive(Clone, Copy, Debug)]
-struct Slopes {
-    x: [[f32; WIDTH]; 2],
-    y: [[f32; WIDTH]; 2],
-}
-
-/// The bundles of a batch.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Bundles {
-    slopes: Vec<Slopes>,
-    bounds: Bounds,
-    /// Nearness of the farthest and the nearest receiver.
-    farthest: f32,
-    nearest: f32,
-}
-
-impl Bundles {
-    /// Takes the rays from the receivers `active`, which have these bounds, to their samples.
-    #[inline(always)]
-    pub(crate) fn set<S: Simd>(
-        &mut self,
-        simd: S,
-        (frame, light): (&FrameLanes, &LightBox),
-        places: &Places<S>,
-        points: &SamplePoints,
-        (active, bounds): (u32, &Bounds),
-    ) {
-        self.bounds = *bounds;
-        let [low, high] = bounds.depth;
-        let rounding = 4.0 * f32::EPSILON;
-        (self.farthest, self.nearest) = match frame.reach {
-            Some(reach) => (reach - high - reach * rounding, reach - low + reach * rounding),
-            None if low > 0.0 => ((1.0 - rounding) / high, (1.0 + rounding) / low),
-            None => (-FAR, FAR),
-        };
-        self.slopes.clear();
-        for (slot, (offsets, lanes)) in points.offsets.iter().zip(&points.lanes).enumerate() {
-            if slot % WIDTH == 0 {
-                // Nothing meets what is empty.
-                let none = [[FAR; WIDTH], [-FAR; WIDTH]];
-                self.slopes.push(Slopes { x: none, y: none });
-            }
-            let lanes = lanes & active;
-            if lanes == 0 {
-                continue;
-            }
-            let d = load3(simd, offsets);
-            let [x, y] = match frame.reach {
-                Some(_) => parallel_slopes(simd, (frame, light), d),
-                None => slopes(simd, (frame, light), places, d),
-            };
-            let mask = mask_of(simd, lanes);
-            let far = f32x16::splat(simd, FAR);
-            let all = self.slopes.last_mut().expect("pushed above");
-            all.x[0][slot % WIDTH] = mask.select(x[0], far).reduce_min();
-            all.x[1][slot % WIDTH] = mask.select(x[1], -far).reduce_max();
-            all.y[0][slot % WIDTH] = mask.select(y[0], far).reduce_min();
-            all.y[1][slot % WIDTH] = mask.select(y[1], -far).reduce_max();
-        }
-    }
-
-    /// A bit for each of eight bundles that may meet a box.
-    #[inline(always)]
-    pub(crate) fn met<S: Simd>(
-        &self,
-        simd: S,
-        eight: usize,
-        [x0, x1, y0, y1, nearest, farthest]: [f32; 6],
-    ) -> u32 {
-        let splat = |v: f32| f32x8::splat(simd, v);
-        // Wider than what rounding of these few operations may do.
-        let most = splat((nearest - self.farthest).max(0.0) * 1.00001);
-        let least = splat((farthest - self.nearest).max(0.0) * 0.99999);
-        let slopes = &self.slopes[eight];
-        let Bounds { x, y, .. } = self.bounds;
-        let lengths = [most, least];
-        let left = splat(x[0]) + drift(simd, &slopes.x[0], lengths)[0];
-        let right = splat(x[1]) + drift(simd, &slopes.x[1], lengths)[1];
-        let top = splat(y[0]) + drift(simd, &slopes.y[0], lengths)[0];
-        let bottom = splat(y[1]) + drift(simd, &slopes.y[1], lengths)[1];
-        let apart = left.simd_gt(splat(x1))
-            | right.simd_lt(splat(x0))
-            | top.simd_gt(splat(y1))
-            | bottom.simd_lt(splat(y0));
-        !(apart.to_bitmask() as u32) & 0xff
-    }
-}
-
-/// How far rays of these slopes go aside over two lengths, the smaller value first.
+/// The bundle of each slot, from the receivers `active`. `search` is that of all their rays.
 #[inline(always)]
-fn drift<S: Simd>(simd: S, slope: &[f32; WIDTH], [most, least]: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
-    let slope = f32x8::from_slice(simd, slope);
-    let (a, b) = (slope * most, slope * least);
-    [a.min(b), a.max(b)]
+pub(crate) fn bundles<S: Simd>(
+    simd: S,
+    (frame, light): (&FrameLanes, &LightBox),
+    places: &Places<S>,
+    points: &SamplePoints,
+    (active, search): (u32, &Search),
+    out: &mut Vec<Search>,
+) {
+    out.clear();
+    for (offsets, lanes) in points.offsets.iter().zip(&points.lanes) {
+        let d = load3(simd, offsets);
+        let [x, y] = match frame.reach {
+            Some(_) => parallel_slopes(simd, (frame, light), d),
+            None => slopes(simd, (frame, light), places, d),
+        };
+        let mask = mask_of(simd, lanes & active);
+        out.push(search.with_slopes([range_of(simd, mask, x), range_of(simd, mask, y)]));
+    }
 }
 
 /// Smallest and largest slopes along x and y of the rays to the samples `d`, in perspective.
@@ -125,7 +48,8 @@ fn slopes<S: Simd>(
     let splat = |v: f32| f32x16::splat(simd, v);
     let center = frame.center.iter().map(|c| c.abs()).sum::<f32>();
     let error = splat((light.reach.iter().sum::<f32>() * 3.0 + center) * (8.0 * f32::EPSILON));
-    let q = each3(|axis| d[axis] - splat(frame.center[axis]));
+    let middle = splat3(simd, frame.center);
+    let q = [d[0] - middle[0], d[1] - middle[1], d[2] - middle[2]];
     let (s, t, u) = (
         plain(simd, q, frame.right),
         -plain(simd, q, frame.up),
@@ -189,18 +113,20 @@ fn parallel_slopes<S: Simd>(
 ) -> [[f32x16<S>; 2]; 2] {
     let splat = |v: f32| f32x16::splat(simd, v);
     let error = splat(light.reach.iter().sum::<f32>() * (32.0 * f32::EPSILON));
-    let q = each3(|axis| d[axis] + splat(light.middle[axis]));
+    let middle = splat3(simd, light.middle);
+    let q = [d[0] + middle[0], d[1] + middle[1], d[2] + middle[2]];
     let towards = -plain(simd, q, frame.forward);
     let known = towards.simd_gt(splat(0.1));
-    let range = |across: f32x16<S>| {
+    let (one, wide, far) = (splat(1.0), splat(1.2), splat(FAR));
+    let across = [plain(simd, q, frame.right), -plain(simd, q, frame.up)];
+    let mut pair = [[far; 2]; 2];
+    for (pair, across) in pair.iter_mut().zip(across) {
         let slope = across / towards;
-        let slack = error * (splat(1.0) + slope.abs()) / towards * splat(1.2);
-        [
-            known.select(slope - slack, splat(-FAR)),
-            known.select(slope + slack, splat(FAR)),
-        ]
-    };
-    let right = range(plain(simd, q, frame.right));
-    let down = range(-plain(simd, q, frame.up));
-    [right, down]
+        let slack = error * (one + slope.abs()) / towards * wide;
+        *pair = [
+            known.select(slope - slack, -far),
+            known.select(slope + slack, far),
+        ];
+    }
+    pair
 }

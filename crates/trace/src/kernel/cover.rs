@@ -13,7 +13,7 @@
 //! Cost: some 20 operations a triangle of the sheet.
 
 use super::LANES;
-use super::lines::Group;
+use super::lines::{Group, Record};
 use super::shaft::{Boxes, Culled};
 use crate::Triangles;
 
@@ -28,6 +28,9 @@ const SHEET: u8 = 1 << 5;
 /// It belongs to a sheet that does not hide everything.
 const OPEN: u8 = 1 << 6;
 
+/// Its record is copied.
+const COPIED: u8 = 1 << 7;
+
 /// Triangles found, copied together.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Found {
@@ -35,6 +38,8 @@ pub(crate) struct Found {
     pub(crate) places: Vec<(u32, u32)>,
     /// Their boxes, copied together.
     pub(crate) boxes: Vec<Boxes>,
+    /// The triangles, as far as they are known.
+    records: Vec<Record>,
     flags: Vec<u8>,
     /// Whether some triangle may begin a sheet.
     seeds: bool,
@@ -61,6 +66,9 @@ impl Found {
         }
         self.boxes[to].set(at, boxes.get(lane as usize));
         self.places.push((group, lane));
+        if self.records.len() < self.places.len() {
+            self.records.push(Record::default());
+        }
         self.note(culled, lane as usize);
     }
 
@@ -70,6 +78,23 @@ impl Found {
         let flags = flags_of(culled, lane);
         self.seeds |= flags & (BETWEEN | MIDDLE) == BETWEEN | MIDDLE;
         self.flags.push(flags);
+    }
+
+    /// One of the triangles, copied from the tree when it is first asked for.
+    #[inline(always)]
+    pub(crate) fn record(&mut self, groups: &[Group], index: usize) -> &Record {
+        if self.flags[index] & COPIED == 0 {
+            self.flags[index] |= COPIED;
+            let (group, lane) = self.places[index];
+            self.records[index] = Record::of(&groups[group as usize], lane as usize);
+        }
+        &self.records[index]
+    }
+
+    /// One that was asked for before.
+    #[inline(always)]
+    pub(crate) fn copied(&self, index: usize) -> &Record {
+        &self.records[index]
     }
 
     /// The lanes of a group that hold triangles.

@@ -5,8 +5,8 @@
 
 use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
 
-use super::LANES;
-use super::lines::{each3, load3};
+use super::lines::each3;
+use super::{LANES, load3};
 use crate::area_light::{COS, SIN, Shape};
 use crate::samples::{DIMENSION, HASH, SCRAMBLE, second};
 use crate::{AreaLight, Samples};
@@ -62,8 +62,8 @@ pub(crate) fn light_points<S: Simd>(
     let two_to = |bits: u32| splat((1u32 << bits) as f32);
     let mut offsets = [[0.0; LANES]; 3];
     for k in 0..samples.count() {
-        let x = unit_float(simd, scrambled(simd, u32x16::splat(simd, k), seeds[0]));
-        let y = unit_float(simd, scrambled(simd, u32x16::splat(simd, second(k)), seeds[1]));
+        let x = unit_float(simd, scrambled(simd, k, seeds[0]));
+        let y = unit_float(simd, scrambled(simd, second(k), seeds[1]));
         let column: u32x16<S> = (x * two_to(column_bits)).to_int();
         let row: u32x16<S> = (y * two_to(row_bits)).to_int();
         let slots: [u32; LANES] = (row * u32x16::splat(simd, 1 << column_bits) + column).into();
@@ -82,9 +82,11 @@ pub(crate) fn light_points<S: Simd>(
             let rounded = center[axis] + offset;
             ((rounded - center[axis]) * splat(unit)).store_slice(&mut offsets[axis]);
         }
+        let ([x, y, z], all) = (&offsets, &mut out.offsets[..]);
         for (lane, slot) in slots.into_iter().enumerate() {
             let slot = slot as usize;
-            (0..3).for_each(|axis| out.offsets[slot][axis][lane] = offsets[axis][lane]);
+            let [to_x, to_y, to_z] = &mut all[slot];
+            (to_x[lane], to_y[lane], to_z[lane]) = (x[lane], y[lane], z[lane]);
             out.lanes[slot] |= 1 << lane;
             out.sample[slot][lane] = k as u8;
         }
@@ -101,10 +103,9 @@ fn hash<S: Simd>(simd: S, mut x: u32x16<S>) -> u32x16<S> {
 }
 
 #[inline(always)]
-fn scrambled<S: Simd>(simd: S, mut x: u32x16<S>, seed: u32x16<S>) -> u32x16<S> {
+fn scrambled<S: Simd>(simd: S, x: u32, seed: u32x16<S>) -> u32x16<S> {
     let splat = |v: u32| u32x16::splat(simd, v);
-    x ^= x * splat(SCRAMBLE[0]);
-    x += seed;
+    let mut x = seed + splat(x ^ x.wrapping_mul(SCRAMBLE[0]));
     x *= (seed >> 16) | splat(1);
     x ^= x * splat(SCRAMBLE[1]);
     x ^= x * splat(SCRAMBLE[2]);

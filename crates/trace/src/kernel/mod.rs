@@ -8,6 +8,7 @@
 //! level.
 
 pub(crate) mod area;
+pub(crate) mod askers;
 pub(crate) mod batch;
 pub(crate) mod bundles;
 pub(crate) mod casters;

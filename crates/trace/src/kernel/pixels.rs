@@ -16,7 +16,7 @@ use crate::Light;
 use crate::view::{Arrangement, View};
 
 /// Lanes of f64 in half a block: two rows of four pixels.
-const HALF: usize = LANES / 2;
+pub(super) const HALF: usize = LANES / 2;
 
 /// The eye rays of a tile, as sums of a part for the column and one for the row.
 #[derive(Clone, Debug, Default)]
@@ -61,6 +61,19 @@ impl TileRays {
         }));
     }
 
+    /// A bound on the coordinates of all starts.
+    pub(crate) fn farthest_start(&self) -> f64 {
+        let largest =
+            |lanes: &[[f64; HALF]; 3]| lanes.as_flattened().iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        let beside = if self.parallel {
+            let most = |all: &[[[f64; HALF]; 3]]| all.iter().map(largest).fold(0.0, f64::max);
+            most(&self.columns) + most(&self.rows)
+        } else {
+            0.0
+        };
+        self.center.abs().max_element() + beside
+    }
+
     /// What half a block's pixels add to the direction, or to the start in a parallel view.
     #[inline(always)]
     fn offsets<S: Simd>(&self, simd: S, block: usize, half: usize) -> [f64x8<S>; 3] {
@@ -85,7 +98,7 @@ impl TileRays {
 
     /// The points at parameter `t`; the operations of [`crate::Receiver::along`].
     #[inline(always)]
-    fn points<S: Simd>(&self, simd: S, block: usize, half: usize, t: f64x8<S>) -> [f64x8<S>; 3] {
+    pub(super) fn points<S: Simd>(&self, simd: S, block: usize, half: usize, t: f64x8<S>) -> [f64x8<S>; 3] {
         let splat = |v: f64| f64x8::splat(simd, v);
         let (center, forward) = (self.center, self.forward);
         let (cx, cy, cz) = (splat(center.x), splat(center.y), splat(center.z));
@@ -103,7 +116,7 @@ impl TileRays {
 const ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
 
 /// A triangle as eye rays from one center meet it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelPlane {
     normal: DVec3,
     /// Sums of which less than this share is left have cancelled.

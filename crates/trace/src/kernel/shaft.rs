@@ -7,10 +7,10 @@
 //! X(n) = X0 + (s - u X0) pz / (pz - u) (n - w),   pz = 1 / w
 //! ```
 //!
-//! so rays drift sideways by at most `drift` (n - w), where n - w is how much nearer to the light they are: not at all
-//! beside their receiver, fully beside the light. A box is searched only if it is nearer than the farthest receiver
-//! and the batch's rectangle, grown by the drift up to the box's nearest point, overlaps it. Parallel views have the
-//! same form, with directions instead of points.
+//! so rays drift sideways in proportion to n - w, how much nearer to the light they are: not at all beside their receiver,
+//! fully beside the light. A box is searched only if it is nearer than the farthest receiver and the batch's rectangle, drifted
+//! by the smallest and the largest slope up to the box, overlaps it. Parallel views have the same form, with directions
+//! instead of points.
 //!
 //! Triangles that pass are tested against the batch's shaft, the hull of the light's box and the receivers' box: out
 //! if all receivers are before its plane, or all lines of the shaft pass outside of one of its edges. That takes some
@@ -18,8 +18,8 @@
 
 use fearless_simd::{Simd, f32x16, prelude::*};
 
-use super::LANES;
-use super::lines::{Group, LightBox, ReceiverLanes, abs3, dot, each3, load3};
+use super::lines::{Group, LightBox, ReceiverLanes, abs3, dot, each3, minor};
+use super::{LANES, load3, splat3};
 
 /// Sixteen boxes in a light's perspective space. 384 bytes.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ pub(crate) struct Boxes {
     /// Nearness of the nearest point.
     pub(crate) nearest: [f32; LANES],
     /// Nearness of the farthest point.
-    farthest: [f32; LANES],
+    pub(crate) farthest: [f32; LANES],
 }
 
 /// Larger than every coordinate that occurs, small enough to be multiplied.
@@ -66,6 +66,7 @@ impl Boxes {
     /// Sets one of them: smallest and largest x, y, and the nearness of the nearest and the farthest point.
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, [x0, x1, y0, y1, nearest, farthest]: [f32; 6]) {
+        let lane = lane % LANES;
         (self.x[0][lane], self.x[1][lane]) = (x0, x1);
         (self.y[0][lane], self.y[1][lane]) = (y0, y1);
         self.nearest[lane] = nearest;
@@ -75,6 +76,7 @@ impl Boxes {
     /// One of them, as [`Self::set`] takes it.
     #[inline(always)]
     pub(crate) fn get(&self, lane: usize) -> [f32; 6] {
+        let lane = lane % LANES;
         let ([x0, x1], [y0, y1]) = (&self.x, &self.y);
         [
             x0[lane],
@@ -96,7 +98,8 @@ pub(crate) struct FrameLanes {
     pub(crate) center: [f32; 3],
     /// Half extents of the light across the view; as tangents in a parallel view.
     pub(crate) half: [f32; 2],
-    /// Depth of the light's farthest point.
+    /// Depths of the light's nearest and its farthest point.
+    pub(crate) near: f32,
     pub(crate) depth: f32,
     /// In a parallel view, nearness + depth.
     pub(crate) reach: Option<f32>,
@@ -123,7 +126,8 @@ impl<S: Simd> Places<S> {
     pub(crate) fn of(simd: S, frame: &FrameLanes, receivers: &ReceiverLanes) -> Self {
         let splat = |v: f32| f32x16::splat(simd, v);
         let p = load3(simd, &receivers.p);
-        let p = each3(|axis| p[axis] - splat(frame.center[axis]));
+        let center = splat3(simd, frame.center);
+        let p = [p[0] - center[0], p[1] - center[1], p[2] - center[2]];
         let size = frame.center[0].abs() + frame.center[1].abs() + frame.center[2].abs();
         let error = (f32x16::from_slice(simd, &receivers.size) * splat(3.0) + splat(size))
             * splat(8.0 * f32::EPSILON);
@@ -141,19 +145,36 @@ impl<S: Simd> Places<S> {
         Self { x, y, depth: depths }
     }
 
+    /// A bit for each of less depth than that.
+    #[inline(always)]
+    pub(crate) fn nearer(&self, simd: S, depth: f32) -> u32 {
+        self.depth[0].simd_lt(f32x16::splat(simd, depth)).to_bitmask() as u32
+    }
+
     /// Bounds of those whose bits are set in `active`.
     #[inline(always)]
     pub(crate) fn bounds(&self, simd: S, active: u32) -> Bounds {
-        let splat = |v: f32| f32x16::splat(simd, v);
         let active = mask_of(simd, active);
-        let least = |v: f32x16<S>| active.select(v, splat(FAR)).reduce_min();
-        let most = |v: f32x16<S>| active.select(v, splat(-FAR)).reduce_max();
         Bounds {
-            x: [least(self.x[0]), most(self.x[1])],
-            y: [least(self.y[0]), most(self.y[1])],
-            depth: [least(self.depth[0]), most(self.depth[1])],
+            x: range_of(simd, active, self.x),
+            y: range_of(simd, active, self.y),
+            depth: range_of(simd, active, self.depth),
         }
     }
+}
+
+/// The least of the first and the largest of the second among these lanes.
+#[inline(always)]
+pub(crate) fn range_of<S: Simd>(
+    simd: S,
+    active: fearless_simd::mask32x16<S>,
+    [low, high]: [f32x16<S>; 2],
+) -> [f32; 2] {
+    let far = f32x16::splat(simd, FAR);
+    [
+        active.select(low, far).reduce_min(),
+        active.select(high, -far).reduce_max(),
+    ]
 }
 
 /// The scalar product with a vector that is the same for all lanes, not fused.
@@ -181,8 +202,8 @@ fn divided<S: Simd>(simd: S, side: f32x16<S>, depth: f32x16<S>, error: f32x16<S>
 pub(crate) struct Reach<S: Simd> {
     x: [f32x16<S>; 2],
     y: [f32x16<S>; 2],
-    farthest: f32x16<S>,
-    drift: [f32x16<S>; 2],
+    nearness: [f32x16<S>; 2],
+    slopes: [[f32x16<S>; 2]; 2],
 }
 
 impl<S: Simd> Reach<S> {
@@ -191,43 +212,98 @@ impl<S: Simd> Reach<S> {
         let splat = |v: f32| f32x16::splat(simd, v);
         let (x, y, depth) = (places.x, places.y, places.depth);
         if let Some(reach) = frame.reach {
+            let rounding = reach * 4.0 * f32::EPSILON;
+            let half = [splat(frame.half[0]), splat(frame.half[1])];
             return Self {
                 x,
                 y,
-                farthest: splat(reach - reach * 4.0 * f32::EPSILON) - depth[1],
-                drift: [splat(frame.half[0]), splat(frame.half[1])],
+                nearness: [
+                    splat(reach - rounding) - depth[1],
+                    splat(reach + rounding) - depth[0],
+                ],
+                slopes: [[-half[0], half[0]], [-half[1], half[1]]],
             };
         }
-        let beyond = depth[0].simd_gt(splat(frame.depth * 1.001)) & depth[0].simd_gt(splat(0.0));
-        let ratio = depth[0] / (depth[0] - splat(frame.depth)) * splat(1.0001);
-        let drift = |half: f32, range: [f32x16<S>; 2]| {
-            let slope = splat(frame.depth).mul_add(range[0].abs().max(range[1].abs()), splat(half));
-            beyond.select((slope * ratio).min(splat(FAR)), splat(FAR))
-        };
-        let ahead = depth[1].simd_gt(splat(0.0));
+        let (zero, far) = (splat(0.0), splat(FAR));
+        let (less, more) = (splat(1.0 - 2.0 * f32::EPSILON), splat(1.0 + 2.0 * f32::EPSILON));
         Self {
             x,
             y,
-            farthest: ahead.select(splat(1.0 - 2.0 * f32::EPSILON) / depth[1], splat(-FAR)),
-            drift: [drift(frame.half[0], x), drift(frame.half[1], y)],
+            nearness: [
+                depth[1].simd_gt(zero).select(less / depth[1], -far),
+                depth[0].simd_gt(zero).select(more / depth[0], far),
+            ],
+            slopes: [
+                slope_range(simd, frame, frame.half[0], x, depth),
+                slope_range(simd, frame, frame.half[1], y, depth),
+            ],
         }
     }
 
     /// A bit for each receiver whose rays may meet a box.
     #[inline(always)]
-    pub(crate) fn meets(&self, simd: S, [x0, x1, y0, y1, nearest, _]: [f32; 6]) -> u32 {
+    pub(crate) fn meets(&self, simd: S, [x0, x1, y0, y1, nearest, farthest]: [f32; 6]) -> u32 {
         let splat = |v: f32| f32x16::splat(simd, v);
-        let nearer = splat(nearest) - self.farthest;
-        // The slack covers the rounding of these few operations.
-        let wide = nearer * splat(1.00002);
-        let (dx, dy) = (wide * self.drift[0], wide * self.drift[1]);
+        let nearer = splat(nearest) - self.nearness[0];
+        let lengths = lengths(simd, nearer, splat(farthest) - self.nearness[1]);
+        let [left, right] = drifted(self.x, self.slopes[0], lengths);
+        let [top, bottom] = drifted(self.y, self.slopes[1], lengths);
         let hit = nearer.simd_ge(splat(0.0))
-            & (self.x[1] + dx).simd_ge(splat(x0))
-            & (self.x[0] - dx).simd_le(splat(x1))
-            & (self.y[1] + dy).simd_ge(splat(y0))
-            & (self.y[0] - dy).simd_le(splat(y1));
+            & right.simd_ge(splat(x0))
+            & left.simd_le(splat(x1))
+            & bottom.simd_ge(splat(y0))
+            & top.simd_le(splat(y1));
         hit.to_bitmask() as u32
     }
+}
+
+/// How far rays go beside a box at most and at least, a little apart, which covers the rounding of what is made of them.
+#[inline(always)]
+fn lengths<S: Simd>(simd: S, most: f32x16<S>, least: f32x16<S>) -> [f32x16<S>; 2] {
+    let zero = f32x16::splat(simd, 0.0);
+    [
+        most.max(zero) * f32x16::splat(simd, 1.00001),
+        least.max(zero) * f32x16::splat(simd, 0.99999),
+    ]
+}
+
+/// A range after rays of these slopes have gone these lengths.
+#[inline(always)]
+fn drifted<S: Simd>(
+    range: [f32x16<S>; 2],
+    slopes: [f32x16<S>; 2],
+    [most, least]: [f32x16<S>; 2],
+) -> [f32x16<S>; 2] {
+    [
+        range[0] + (slopes[0] * most).min(slopes[0] * least),
+        range[1] + (slopes[1] * most).max(slopes[1] * least),
+    ]
+}
+
+/// Smallest and largest slopes along an axis of the rays from receivers at these places to a light that reaches so far to
+/// both sides.
+#[inline(always)]
+fn slope_range<S: Simd>(
+    simd: S,
+    frame: &FrameLanes,
+    half: f32,
+    at: [f32x16<S>; 2],
+    depth: [f32x16<S>; 2],
+) -> [f32x16<S>; 2] {
+    let splat = |v: f32| f32x16::splat(simd, v);
+    let (near, far, most) = (splat(frame.near), splat(frame.depth), splat(FAR));
+    let known = depth[0].simd_gt(splat(frame.depth * 1.001)) & depth[0].simd_gt(splat(0.0));
+    // With depths as far apart as that, this covers what cancels in their difference.
+    let steep = depth[0] / (depth[0] - far) * splat(1.001);
+    let flat = depth[1] / (depth[1] - near) * splat(0.999);
+    let size = far.mul_add(at[0].abs().max(at[1].abs()), splat(half)) * splat(8.0 * f32::EPSILON);
+    let low = -splat(half) - (near * at[1]).max(far * at[1]) - size;
+    let high = splat(half) - (near * at[0]).min(far * at[0]) + size;
+    let (low, high) = ((low * steep).min(low * flat), (high * steep).max(high * flat));
+    [
+        known.select(low.max(-most), -most),
+        known.select(high.min(most), most),
+    ]
 }
 
 impl Default for Bounds {
@@ -243,6 +319,12 @@ impl Bounds {
         y: [FAR, -FAR],
         depth: [FAR, -FAR],
     };
+
+    /// Whether the depths are much the same.
+    #[inline(always)]
+    pub(crate) fn are_close(&self) -> bool {
+        self.depth[1] < 1.1 * self.depth[0]
+    }
 
     /// The bounds of both.
     #[inline(always)]
@@ -268,10 +350,10 @@ pub(crate) fn mask_of<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x16<S
 pub(crate) struct Search {
     x: [f32; 2],
     y: [f32; 2],
-    /// Nearness of the farthest receiver.
-    farthest: f32,
-    /// Sideways drift of rays per unit of nearness.
-    drift: [f32; 2],
+    /// Nearness of the farthest and of the nearest receiver.
+    nearness: [f32; 2],
+    /// Smallest and largest sideways drift of rays per unit of nearness.
+    slopes: [[f32; 2]; 2],
 }
 
 impl Search {
@@ -279,31 +361,56 @@ impl Search {
     pub(crate) fn new(frame: &FrameLanes, bounds: &Bounds) -> Self {
         let Bounds { x, y, depth } = *bounds;
         if let Some(reach) = frame.reach {
+            let rounding = reach * 4.0 * f32::EPSILON;
             return Self {
                 x,
                 y,
-                farthest: reach - depth[1] - reach * 4.0 * f32::EPSILON,
-                drift: frame.half,
+                nearness: [reach - depth[1] - rounding, reach - depth[0] + rounding],
+                slopes: frame.half.map(|half| [-half, half]),
             };
         }
-        let drift = |half: f32, range: [f32; 2]| {
-            // Written so that what is not a number becomes FAR.
-            if depth[0] > frame.depth * 1.001 && depth[0] > 0.0 {
-                let slope = half + frame.depth * range[0].abs().max(range[1].abs());
-                (slope * depth[0] / (depth[0] - frame.depth) * 1.0001).min(FAR)
+        let rounding = 2.0 * f32::EPSILON;
+        let nearness = |depth: f32, sign: f32| {
+            if depth > 0.0 {
+                (1.0 + sign * rounding) / depth
             } else {
-                FAR
+                FAR * sign
             }
         };
         Self {
             x,
             y,
-            farthest: if depth[1] > 0.0 {
-                (1.0 - 2.0 * f32::EPSILON) / depth[1]
-            } else {
-                -FAR
-            },
-            drift: [drift(frame.half[0], x), drift(frame.half[1], y)],
+            nearness: [nearness(depth[1], -1.0), nearness(depth[0], 1.0)],
+            slopes: [
+                Self::slopes(frame, frame.half[0], x, depth),
+                Self::slopes(frame, frame.half[1], y, depth),
+            ],
+        }
+    }
+
+    /// The same receivers, with slopes along x and y of some of their rays.
+    #[inline(always)]
+    pub(crate) fn with_slopes(self, slopes: [[f32; 2]; 2]) -> Self {
+        Self { slopes, ..self }
+    }
+
+    /// As [`slope_range`].
+    #[inline(always)]
+    fn slopes(frame: &FrameLanes, half: f32, at: [f32; 2], depth: [f32; 2]) -> [f32; 2] {
+        let (near, far) = (frame.near, frame.depth);
+        // Written so that what is not a number becomes FAR.
+        if depth[0] > far * 1.001 && depth[0] > 0.0 {
+            let steep = depth[0] / (depth[0] - far) * 1.001;
+            let flat = depth[1] / (depth[1] - near) * 0.999;
+            let size = (half + far * at[0].abs().max(at[1].abs())) * (8.0 * f32::EPSILON);
+            let low = -half - (near * at[1]).max(far * at[1]) - size;
+            let high = half - (near * at[0]).min(far * at[0]) + size;
+            [
+                (low * steep).min(low * flat).max(-FAR),
+                (high * steep).max(high * flat).min(FAR),
+            ]
+        } else {
+            [-FAR, FAR]
         }
     }
 }
@@ -312,18 +419,19 @@ impl Search {
 #[inline(always)]
 pub(crate) fn overlapped<S: Simd>(simd: S, boxes: &Boxes, batch: &Search) -> u32 {
     let splat = |v: f32| f32x16::splat(simd, v);
-    let load = |v: &[f32; LANES]| f32x16::from_slice(simd, v);
-    let nearer = load(&boxes.nearest) - splat(batch.farthest);
+    let nearer = f32x16::from_slice(simd, &boxes.nearest) - splat(batch.nearness[0]);
+    let farther = f32x16::from_slice(simd, &boxes.farthest) - splat(batch.nearness[1]);
+    let lengths = lengths(simd, nearer, farther);
     let mut hit = nearer.simd_ge(splat(0.0));
-    for (sides, range, drift) in [
-        (&boxes.x, batch.x, batch.drift[0]),
-        (&boxes.y, batch.y, batch.drift[1]),
+    for (sides, range, [low, high]) in [
+        (&boxes.x, batch.x, batch.slopes[0]),
+        (&boxes.y, batch.y, batch.slopes[1]),
     ] {
-        let drift = nearer * splat(drift);
-        // The slack covers the rounding of these few operations.
-        let low = splat(range[0]) - drift * splat(1.00001);
-        let high = drift * splat(1.00001) + splat(range[1]);
-        hit = hit & load(&sides[0]).simd_le(high) & load(&sides[1]).simd_ge(low);
+        let left = lengths[usize::from(low > 0.0)].mul_add(splat(low), splat(range[0]));
+        let right = lengths[usize::from(high < 0.0)].mul_add(splat(high), splat(range[1]));
+        hit = hit
+            & f32x16::from_slice(simd, &sides[0]).simd_le(right)
+            & f32x16::from_slice(simd, &sides[1]).simd_ge(left);
     }
     hit.to_bitmask() as u32
 }
@@ -336,6 +444,8 @@ pub(crate) struct ReceiverBox {
     axes: [[f32; 3]; 3],
     /// Half sides of the box along the coordinate axes around it.
     half: [f32; 3],
+    /// Their largest coordinate.
+    size: f32,
     /// The largest of the receivers' error bounds of edges and planes, see [`ReceiverLanes`].
     edge_error: f32,
     plane_error: f32,
@@ -367,6 +477,13 @@ pub(crate) fn surface_axes(receivers: &ReceiverLanes, active: u32) -> [[f32; 3];
     }
 }
 
+/// The largest of the values of these lanes, or 0.
+#[inline(always)]
+fn largest<S: Simd>(simd: S, active: fearless_simd::mask32x16<S>, v: &[f32; LANES]) -> f32 {
+    let v = f32x16::from_slice(simd, v);
+    active.select(v, f32x16::splat(simd, 0.0)).reduce_max()
+}
+
 impl ReceiverBox {
     /// The box of the receivers whose bits are set in `active`, for each batch.
     #[inline(always)]
@@ -390,13 +507,9 @@ impl ReceiverBox {
                 low[i] = low[i].min(active.select(at, splat(FAR)).reduce_min());
                 high[i] = high[i].max(active.select(at, splat(-FAR)).reduce_max());
             }
-            let most = |v: &[f32; LANES]| {
-                let v = f32x16::from_slice(simd, v);
-                active.select(v, splat(0.0)).reduce_max()
-            };
-            size = size.max(most(&receivers.size));
-            edge_error = edge_error.max(most(&receivers.edge_error));
-            plane_error = plane_error.max(most(&receivers.plane_error));
+            size = size.max(largest(simd, active, &receivers.size));
+            edge_error = edge_error.max(largest(simd, active, &receivers.edge_error));
+            plane_error = plane_error.max(largest(simd, active, &receivers.plane_error));
         }
         // Rounding of these sums, and axes that are not quite orthogonal.
         let slack = size * 16.0 * f32::EPSILON;
@@ -408,6 +521,7 @@ impl ReceiverBox {
             middle: each3(axis),
             axes: scaled,
             half: each3(|k| scaled[0][k].abs() + scaled[1][k].abs() + scaled[2][k].abs()),
+            size,
             edge_error,
             plane_error,
         }
@@ -441,21 +555,6 @@ fn over<S: Simd>(simd: S, axes: &[[f32; 3]; 3], v: [f32x16<S>; 3]) -> f32x16<S> 
     dot(simd, v, axes[0]).abs() + dot(simd, v, axes[1]).abs() + dot(simd, v, axes[2]).abs()
 }
 
-/// One coordinate, of axes `a` and `b`, of the cross product of `e` and `p`, and `add`.
-#[inline(always)]
-fn minor<S: Simd>(e: [f32x16<S>; 3], p: [f32x16<S>; 3], [a, b]: [usize; 2], add: f32x16<S>) -> f32x16<S> {
-    e[a].mul_add(p[b], add) - e[b] * p[a]
-}
-
-#[inline(always)]
-fn splat3<S: Simd>(simd: S, v: [f32; 3]) -> [f32x16<S>; 3] {
-    [
-        f32x16::splat(simd, v[0]),
-        f32x16::splat(simd, v[1]),
-        f32x16::splat(simd, v[2]),
-    ]
-}
-
 /// Sorts out the triangles `candidates` of a group.
 #[inline(always)]
 pub(crate) fn culled<S: Simd>(
@@ -478,7 +577,7 @@ pub(crate) fn culled<S: Simd>(
         return Culled::default();
     }
     let between = (plane + thickness).simd_lt(-plane_slack);
-    let slack = splat(receivers.edge_error * 2.0);
+    let slack = splat(receivers.edge_error * 2.0 + light.slack(receivers.size));
     let mut least_middle = splat(f32::INFINITY);
     let mut cut = [0; 3];
     for (i, cut) in cut.iter_mut().enumerate() {
@@ -496,7 +595,7 @@ pub(crate) fn culled<S: Simd>(
             sizes[0] * half[1] + sizes[1] * half[0],
         ];
         let mut middle = dot(simd, gradient, light.middle);
-        let mut spread = dot(simd, abs3(gradient), light.half) + dot(simd, spreads, light.reach);
+        let mut spread = light.spread(simd, gradient) + dot(simd, spreads, light.reach);
         if light.weight != 0.0 {
             middle -= dot(simd, m, p);
             spread += over(simd, axes, m);

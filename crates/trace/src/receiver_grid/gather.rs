@@ -9,7 +9,7 @@ use crate::kernel::pixels::{
     project_receivers,
 };
 use crate::kernel::{LANES, SimdLevel};
-use crate::view::Arrangement;
+use crate::view::{Arrangement, View};
 use crate::visibility::{Visibility, VisibleTile};
 use crate::{Triangles, exact};
 
@@ -75,19 +75,22 @@ const PART: usize = 16;
 const PARTS: usize = 1024;
 
 /// Working memory of one thread.
-#[derive(Default)]
-struct GatherWork {
-    rays: TileRays,
+#[derive(Debug, Default)]
+pub(crate) struct GatherWork {
+    /// The eye's rays of the tile.
+    pub(crate) rays: TileRays,
     spans: Vec<Span>,
     /// The triangles seen in a tile, their corners and planes.
     prims: Vec<u32>,
     corners: Vec<[Vec3; 3]>,
     planes: Vec<PixelPlane>,
-    /// Whether each turns the side that is seen to the light.
-    faces: Vec<bool>,
+    /// Whether each asks.
+    asking: Vec<bool>,
     table: PrimTable,
-    t: Vec<[f64; LANES]>,
-    asked: Vec<u16>,
+    /// Hit parameters, block by block.
+    pub(crate) t: Vec<[f64; LANES]>,
+    /// A bit for each pixel of each block that asks.
+    pub(crate) asked: Vec<u16>,
     unsound: Vec<(u32, u32)>,
     entries: Vec<Entry>,
 }
@@ -111,8 +114,8 @@ pub(super) fn gather(
         part.asked.clear();
         work.entries.clear();
         for (i, tile) in tiles.iter().enumerate() {
-            work.find_spans(visibility, triangles, query, tile, level);
-            work.find_points(visibility, triangles, tile, level);
+            let plane = |prim, corners| query.plane(visibility.view(), triangles, prim, corners);
+            work.find(visibility.view(), triangles, tile, plane, level);
             let asking = Asking {
                 eye_tile: (index * size + i) as u32,
                 part: index as u16,
@@ -133,31 +136,44 @@ pub(super) fn gather(
 }
 
 impl GatherWork {
-    /// The pixels that see the same triangle, as far as it turns the side they see to the light.
+    /// Finds the surface points of a tile's pixels whose triangle has a plane here, which it has if they ask.
+    pub(crate) fn find(
+        &mut self,
+        view: &View,
+        triangles: &Triangles,
+        tile: &VisibleTile,
+        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
+        level: SimdLevel,
+    ) {
+        self.find_spans(view, triangles, tile, plane_of, level);
+        self.find_points(view, triangles, tile, level);
+    }
+
+    /// The pixels that see the same triangle, as far as they ask.
     fn find_spans(
         &mut self,
-        visibility: &Visibility,
+        view: &View,
         triangles: &Triangles,
-        query: &LightQuery,
         tile: &VisibleTile,
+        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
         level: SimdLevel,
     ) {
         self.prims.clear();
         self.table.clear();
         let (prims, table) = (&mut self.prims, &mut self.table);
-        let mut plane_of = |prim: u32| {
+        let mut position_of = |prim: u32| {
             table.entry(prim, || {
                 prims.push(prim);
                 prims.len() as u32 - 1
             })
         };
-        find_spans(level, &tile.prims, &mut plane_of, &mut self.spans);
-        self.find_planes(visibility, triangles, query);
+        find_spans(level, &tile.prims, &mut position_of, &mut self.spans);
+        self.find_planes(view, triangles, plane_of);
         self.asked.clear();
         self.asked.resize(tile.prims.len(), 0);
-        let (faces, asked) = (&self.faces, &mut self.asked);
+        let (asking, asked) = (&self.asking, &mut self.asked);
         self.spans.retain(|span| {
-            let asks = faces[span.plane as usize];
+            let asks = asking[span.plane as usize];
             asked[span.block as usize] |= if asks { span.pixels as u16 } else { 0 };
             asks
         });
@@ -165,34 +181,28 @@ impl GatherWork {
 
     /// The planes of the triangles that are seen. Corners may lie anywhere in memory: they are read in a loop of its own,
     /// so that the processor waits for several at a time.
-    fn find_planes(&mut self, visibility: &Visibility, triangles: &Triangles, query: &LightQuery) {
-        let view = visibility.view();
+    fn find_planes(
+        &mut self,
+        view: &View,
+        triangles: &Triangles,
+        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
+    ) {
         let in_lanes = matches!(view.arrangement, Arrangement::Perspective);
-        let ends = [&query.light, &query.eye];
         self.corners.clear();
         self.corners
             .extend(self.prims.iter().map(|&prim| triangles.corners(prim)));
         self.planes.clear();
-        self.faces.clear();
+        self.asking.clear();
         for (&prim, &corners) in self.prims.iter().zip(&self.corners) {
-            let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
-            self.faces.push(match fronts {
-                [Some(lit), Some(seen)] => lit == seen,
-                _ => query.faces(triangles, prim),
-            });
+            let plane = plane_of(prim, corners);
+            self.asking.push(plane.is_some());
+            let plane = plane.unwrap_or_default();
             self.planes.push(if in_lanes { plane } else { plane.unsound() });
         }
     }
 
     /// Hit parameters of all pixels that ask.
-    fn find_points(
-        &mut self,
-        visibility: &Visibility,
-        triangles: &Triangles,
-        tile: &VisibleTile,
-        level: SimdLevel,
-    ) {
-        let view = visibility.view();
+    fn find_points(&mut self, view: &View, triangles: &Triangles, tile: &VisibleTile, level: SimdLevel) {
         let blocks = [tile.stride, tile.prims.len() as u32 / tile.stride];
         self.rays.set(view, [tile.tile.x, tile.tile.y], blocks);
         self.t.clear();
@@ -222,7 +232,7 @@ impl GatherWork {
 }
 
 /// Positions of the triangles seen in a tile: open addressing, emptied by counting up.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct PrimTable {
     slots: Vec<(u32, u32, u32)>,
     round: u32,

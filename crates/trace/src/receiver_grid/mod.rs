@@ -24,10 +24,11 @@ mod light_tile;
 
 use std::sync::atomic::AtomicU16;
 
+use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::kernel::SimdLevel;
-use crate::kernel::pixels::{BlockPoints, LIGHT_TILE};
+use crate::kernel::pixels::{BlockPoints, LIGHT_TILE, PixelPlane};
 use crate::kernel::receivers::Points;
 use crate::light_grid::takes_part;
 use crate::view::View;
@@ -35,6 +36,7 @@ use crate::visibility::place;
 use crate::{CastRule, Clusters, Cone, Light, Triangles, Visibility, exact};
 
 use casters::{CasterChunk, PlacedChunk, PlacedClusters};
+pub(crate) use gather::GatherWork;
 use gather::Part;
 use light_tile::LightTileWork;
 
@@ -244,6 +246,17 @@ impl LitPixels {
 }
 
 impl LightQuery<'_> {
+    /// The plane of a triangle whose pixels ask: it turns the side that they see to the light.
+    fn plane(&self, view: &View, triangles: &Triangles, prim: u32, corners: [Vec3; 3]) -> Option<PixelPlane> {
+        let ends = [&self.light, &self.eye];
+        let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
+        let asks = match fronts {
+            [Some(lit), Some(seen)] => lit == seen,
+            _ => self.faces(triangles, prim),
+        };
+        asks.then_some(plane)
+    }
+
     /// Whether the light is on the side of a triangle that the eye sees.
     fn faces(&self, triangles: &Triangles, prim: u32) -> bool {
         let corners = triangles.corners(prim);
