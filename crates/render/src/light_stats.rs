@@ -75,6 +75,7 @@ pub(crate) fn light_stats(plan: &FramePlan, shadows: &[LightShadows]) -> Vec<Lig
                 LightShadows::Tree(..) => "tree",
                 LightShadows::Pixels(_) => "receivers",
                 LightShadows::Area(_) => "area tree",
+                LightShadows::AreaGrid(_) => "area grid",
                 LightShadows::Reference => "reference",
             },
             costs: plan.as_ref().and_then(|plan| plan.costs),

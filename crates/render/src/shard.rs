@@ -204,6 +204,7 @@ impl Checksum {
             shard: _,
             paper,
             reference,
+            shadow_structure: _,
             level: _,
         } = options;
         self.text(&(width, height, lens, samples, seed, paper, reference));
@@ -221,9 +222,10 @@ impl Checksum {
             indices,
             attributes,
             objects,
+            solids,
             ..
         } = geometry;
-        self.text(&(origin, objects, x.len(), indices.len()));
+        self.text(&(origin, objects, solids, x.len(), indices.len()));
         let arrays: [&[u8]; 9] = [
             cast_slice(x),
             cast_slice(y),

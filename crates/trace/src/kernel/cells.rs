@@ -73,7 +73,7 @@ fn range<S: Simd>(
     if grid.pixel_centres {
         // Half-integers within.
         (low, high) = ((low - half).ceil(), (high + half).floor() - splat(1.0));
-        matters = matters & low.simd_le(high);
+        matters &= low.simd_le(high);
     }
     let (side, last) = (splat(grid.side), splat(grid.cells[axis] as f32 - 1.0));
     let first = (low / side).min(last).max(zero).to_int::<i32x16<S>>();
