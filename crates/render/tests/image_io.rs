@@ -151,7 +151,7 @@ fn npy_is_a_numpy_array() {
         .map(|b| u32::from_le_bytes(b.try_into().unwrap()))
         .collect();
     assert_eq!(ids, film.object);
-    for layer in LayerKind::ALL {
+    for layer in LayerKind::ALL.into_iter().filter(|&layer| film.holds(layer)) {
         write_npy(&path, &film, layer).unwrap();
         let picture = read_picture(&path).unwrap();
         assert_eq!(

@@ -1,8 +1,7 @@
 //! The light of surfaces that paths have come to: from lights, and from an environment.
 //!
-//! A light without a size, seen by a mirror that a diffuse ray found by chance, would be a rare and very bright dot in the
-//! picture. Such mirrors are lit as if they were rougher ([`SOFTENED`]), so their caustics are blurred (path-space
-//! regularisation, Kaplanyan and Dachsbacher 2013).
+//! A light seen by a mirror that a diffuse ray found by chance would be a rare and very bright dot in the picture. Such
+//! mirrors show no lights, so their caustics are those of the environment alone.
 //!
 //! Shadows are asked of the general structure, both sides of all triangles casting: the rule by which back faces
 //! alone may cast is one about what the eye sees.
@@ -25,17 +24,17 @@ use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
 
-/// Least roughness of surfaces lit on the way of a diffuse ray.
-const SOFTENED: f32 = 0.4;
-
-/// An arrival's surface as it is lit.
+/// An arrival's surface as lights are seen by it: that of a mirror on the way of a diffuse ray reflects none.
 fn lit_surface(arrival: &Arrival) -> Surface {
     let surface = arrival.surface;
-    if !arrival.diffused {
+    if !(arrival.diffused && lobes::is_smooth(&surface)) {
         return surface;
     }
     Surface {
-        roughness: surface.roughness.max(SOFTENED),
+        base_color: surface.base_color * (1.0 - surface.metallic),
+        metallic: 0.0,
+        f0: Vec3::ZERO,
+        specular: 0.0,
         ..surface
     }
 }
