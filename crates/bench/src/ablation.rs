@@ -68,88 +68,12 @@ pub fn measure(
 /// The ways of one kind of frame, the usual one first.
 fn ways(kind: FrameKind) -> Vec<Ways> {
     let usual = Ways::usual();
-    let named = |name, ways: Ways| Ways { name, ..ways };
-    // All contenders write pictures in tiles of one size; that is all that is not the paper's.
-    let as_in_the_paper = EyeGridOptions {
-        tile: usual.eye.tile,
-        ..EyeGridOptions::paper()
-    };
     let mut all = vec![named("all improvements", usual)];
-    match kind {
-        FrameKind::Eye => {
-            let eye = |name, eye, clusters| Ways {
-                name,
-                eye,
-                clusters,
-                ..usual
-            };
-            let hides_nothing = EyeGridOptions {
-                hierarchy: false,
-                ..usual.eye
-            };
-            let by_rectangle = EyeGridOptions {
-                binning: Binning::Rectangle,
-                ..usual.eye
-            };
-            all.extend([
-                eye("no clusters", usual.eye, false),
-                eye("nothing hides anything", hides_nothing, true),
-                eye("binned by rectangle", by_rectangle, true),
-                eye("HM08's way", as_in_the_paper, false),
-            ]);
-        }
-        FrameKind::EyeHard => {
-            let both = CasterPolicy::Both;
-            let looked_up = Some(LightGridOptions::default());
-            let paper = Ways {
-                eye: as_in_the_paper,
-                clusters: false,
-                looked_up: Some(LightGridOptions::paper()),
-                ..usual
-            };
-            all.extend([
-                named(
-                    "both sides cast",
-                    Ways {
-                        casters: both,
-                        ..usual
-                    },
-                ),
-                named("looked up in a grid", Ways { looked_up, ..usual }),
-                named(
-                    "memory made anew",
-                    Ways {
-                        keeps_memory: false,
-                        ..usual
-                    },
-                ),
-                named("HM08's way", paper),
-            ]);
-        }
-        FrameKind::EyeSoft => {
-            let paper = FaceOptions {
-                resolution: Some([200, 200, 4]),
-                uniform_depth: true,
-                ..FaceOptions::default()
-            };
-            all.extend([
-                named(
-                    "no sheets",
-                    Ways {
-                        sheets: false,
-                        ..usual
-                    },
-                ),
-                named(
-                    "HM08's grid, ray by ray",
-                    Ways {
-                        followed: Some(paper),
-                        ..usual
-                    },
-                ),
-            ]);
-        }
-    }
+    all.extend(match kind {
+        FrameKind::Eye => eye_ways(usual).to_vec(),
+        FrameKind::EyeHard => hard_ways(usual).to_vec(),
+        FrameKind::EyeSoft => soft_ways(usual).to_vec(),
+    });
     let levels = SimdLevel::available();
     let narrower = levels.get(1..).unwrap_or_default().iter();
     all.extend(narrower.map(|&level| Ways {
@@ -157,4 +81,71 @@ fn ways(kind: FrameKind) -> Vec<Ways> {
         ..named(level.name(), usual)
     }));
     all
+}
+
+fn named(name: &'static str, ways: Ways) -> Ways {
+    Ways { name, ..ways }
+}
+
+/// All contenders write pictures in tiles of one size; that is all that is not the paper's.
+fn eye_as_in_the_paper(usual: Ways) -> EyeGridOptions {
+    EyeGridOptions {
+        tile: usual.eye.tile,
+        ..EyeGridOptions::paper()
+    }
+}
+
+fn eye_ways(usual: Ways) -> [Ways; 4] {
+    let eye = |name, eye, clusters| Ways {
+        name,
+        eye,
+        clusters,
+        ..usual
+    };
+    let hides_nothing = EyeGridOptions {
+        hierarchy: false,
+        ..usual.eye
+    };
+    let by_rectangle = EyeGridOptions {
+        binning: Binning::Rectangle,
+        ..usual.eye
+    };
+    [
+        eye("no clusters", usual.eye, false),
+        eye("nothing hides anything", hides_nothing, true),
+        eye("binned by rectangle", by_rectangle, true),
+        eye("HM08's way", eye_as_in_the_paper(usual), false),
+    ]
+}
+
+fn hard_ways(usual: Ways) -> [Ways; 4] {
+    let casters = CasterPolicy::Both;
+    let looked_up = Some(LightGridOptions::default());
+    let paper = Ways {
+        eye: eye_as_in_the_paper(usual),
+        clusters: false,
+        looked_up: Some(LightGridOptions::paper()),
+        ..usual
+    };
+    let keeps_memory = false;
+    [
+        named("both sides cast", Ways { casters, ..usual }),
+        named("looked up in a grid", Ways { looked_up, ..usual }),
+        named(
+            "memory made anew",
+            Ways {
+                keeps_memory,
+                ..usual
+            },
+        ),
+        named("HM08's way", paper),
+    ]
+}
+
+fn soft_ways(usual: Ways) -> [Ways; 2] {
+    let (sheets, followed) = (false, Some(FaceOptions::paper()));
+    [
+        named("no sheets", Ways { sheets, ..usual }),
+        named("HM08's grid, ray by ray", Ways { followed, ..usual }),
+    ]
 }

@@ -68,7 +68,7 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         ..
     } = options;
     let folder = options.folder.as_deref();
-    let [width, height] = if quick { [96, 60] } else { [1920, 1200] };
+    let [width, height] = size(quick);
     let load = |names: &[&str]| -> Result<Vec<BenchScene>> {
         names.iter().map(|name| BenchScene::load(name, folder)).collect()
     };
@@ -87,66 +87,71 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         level,
         ..FramesOptions::default()
     };
+    let build = BuildOptions {
+        width,
+        height,
+        threads,
+        runs,
+        level,
+    };
+    let scaling = ScalingOptions {
+        quick,
+        threads,
+        runs,
+        level,
+    };
     let few: &[&str] = if quick { &["blob-1k"] } else { &ablation::SCENES };
     let some = load(few)?;
     Ok(AllReport {
         frames: frames::measure(&scenes, &frames, progress, &mut |_, _| ())?,
-        build: build::measure(
-            &scenes,
-            &BuildOptions {
-                width,
-                height,
-                threads,
-                runs,
-                level,
-            },
-            progress,
-        )?,
-        tables: tables::measure(
-            &TablesOptions {
-                size: [width, height],
-                threads,
-                runs,
-                level,
-                cubes: if quick { vec![32, 64] } else { vec![512, 1024] },
-                folder: options.folder.clone().filter(|_| !quick),
-            },
-            progress,
-        )?,
-        ablation: ablation::measure(
-            &some,
-            &AblationOptions {
-                width: width / 2,
-                height: height / 2,
-                threads: 1,
-                runs,
-                level,
-            },
-            progress,
-        )?,
-        structures: structures::measure(
-            &some,
-            &StructuresOptions {
-                rays: if quick { 500 } else { 100_000 },
-                classes: RayClass::ALL.to_vec(),
-                runs,
-                cube: if quick { 32 } else { 512 },
-                level,
-                peers: true,
-            },
-            progress,
-        )?,
-        scaling: scaling::measure(
-            &ScalingOptions {
-                quick,
-                threads,
-                runs,
-                level,
-            },
-            progress,
-        )?,
+        build: build::measure(&scenes, &build, progress)?,
+        tables: tables::measure(&of_tables(options), progress)?,
+        ablation: ablation::measure(&some, &of_ablations(options), progress)?,
+        structures: structures::measure(&some, &of_structures(options), progress)?,
+        scaling: scaling::measure(&scaling, progress)?,
         pictures: pictures(quick, progress)?,
     })
+}
+
+fn size(quick: bool) -> [u32; 2] {
+    if quick { [96, 60] } else { [1920, 1200] }
+}
+
+fn of_tables(options: &AllOptions) -> TablesOptions {
+    TablesOptions {
+        size: size(options.quick),
+        threads: options.threads,
+        runs: options.runs,
+        level: options.level,
+        cubes: if options.quick {
+            vec![32, 64]
+        } else {
+            vec![512, 1024]
+        },
+        folder: options.folder.clone().filter(|_| !options.quick),
+    }
+}
+
+fn of_ablations(options: &AllOptions) -> AblationOptions {
+    let [width, height] = size(options.quick).map(|side| side / 2);
+    AblationOptions {
+        width,
+        height,
+        threads: 1,
+        runs: options.runs,
+        level: options.level,
+    }
+}
+
+fn of_structures(options: &AllOptions) -> StructuresOptions {
+    StructuresOptions {
+        rays: if options.quick { 500 } else { 100_000 },
+        classes: RayClass::ALL.to_vec(),
+        runs: options.runs,
+        cube: if options.quick { 32 } else { 512 },
+        level: options.level,
+        peers: true,
+    }
 }
 
 /// Small pictures of some built-in scenes.

@@ -213,7 +213,7 @@ fn answer_all(tracer: &impl General, set: &RaySet, count: &mut impl Count, answe
     answers.clear();
     match &set.asked {
         Asked::Closest(rays) => {
-            answers.extend(rays.iter().map(|ray| Answer::closest(tracer.closest(ray, count))))
+            answers.extend(rays.iter().map(|ray| Answer::closest(tracer.closest(ray, count))));
         }
         Asked::Shadow(pairs) => {
             let shadow = |(receiver, light): &(Receiver, Light)| tracer.shadows(receiver, light, count);
