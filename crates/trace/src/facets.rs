@@ -8,10 +8,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use glam::Vec3;
-
 use crate::kernel::lambert::{DARK, LambertFrame, LambertTile, lambert};
-use crate::kernel::tile::NONE;
 use crate::view::{Arrangement, View};
 use crate::{Light, SimdLevel, Triangles};
 
@@ -90,58 +87,15 @@ impl<'a> Facets<'a> {
         if bits != UNASKED {
             return f32::from_bits(bits);
         }
-        let facet = self.compute(self.triangles.corners(prim));
+        let facet = self.compute(prim);
         stored.store(facet.to_bits(), Ordering::Relaxed);
         facet
     }
 
-    /// Those of a block's triangles, 0 where there is none: one look-up for each triangle that successive pixels see.
-    #[inline]
-    fn of_block(&self, prims: &[u32; BLOCK_LANES]) -> [f32; BLOCK_LANES] {
-        let mut facets = [0.0; BLOCK_LANES];
-        let mut last = (NONE, 0.0);
-        let mut unasked = 0;
-        for (lane, (facet, &prim)) in facets.iter_mut().zip(prims).enumerate() {
-            if prim != last.0 {
-                let bits = if prim == NONE {
-                    0
-                } else {
-                    self.facets[prim as usize].load(Ordering::Relaxed)
-                };
-                unasked |= u32::from(bits == UNASKED) << lane;
-                last = (prim, f32::from_bits(bits));
-            }
-            *facet = last.1;
-        }
-        if unasked != 0 {
-            self.compute_of_block(prims, unasked);
-            return self.of_block(prims);
-        }
-        facets
-    }
-
-    /// Computes the facets of some lanes. Corners may lie anywhere in memory: they are read first, so that the processor
-    /// waits for several at a time.
-    #[inline(never)]
-    fn compute_of_block(&self, prims: &[u32; BLOCK_LANES], mut lanes: u32) {
-        let mut corners = [[Vec3::ZERO; 3]; BLOCK_LANES];
-        let mut asked = [0; BLOCK_LANES];
-        let mut count = 0;
-        while lanes != 0 {
-            asked[count] = prims[lanes.trailing_zeros() as usize];
-            corners[count] = self.triangles.corners(asked[count]);
-            count += 1;
-            lanes &= lanes - 1;
-        }
-        for (&prim, &corners) in asked.iter().zip(&corners).take(count) {
-            let facet = self.compute(corners);
-            self.facets[prim as usize].store(facet.to_bits(), Ordering::Relaxed);
-        }
-    }
-
-    fn compute(&self, corners: [Vec3; 3]) -> f32 {
-        let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
-        let Some(normal) = (v1 - v0).cross(v2 - v0).try_normalize() else {
+    #[cold]
+    fn compute(&self, prim: u32) -> f32 {
+        let [v0, ..] = self.triangles.corners(prim).map(glam::Vec3::as_dvec3);
+        let Some(normal) = self.triangles.normal(prim).try_normalize() else {
             return 0.0;
         };
         let seen = match self.view.arrangement {
@@ -152,9 +106,7 @@ impl<'a> Facets<'a> {
             Light::Point(p) => (p.as_dvec3() - v0).dot(normal),
             Light::Directional(d) => d.as_dvec3().normalize_or_zero().dot(normal),
         };
-        let facet = (facing * seen.signum()) as f32;
-        // Not the one that means "unasked".
-        if facet.is_nan() { f32::NAN } else { facet }
+        (facing * seen.signum()) as f32
     }
 
     /// Shades the pixels of a tile whose first pixel is `corner`. `out` has one entry a block, in rows of `stride`.
@@ -171,11 +123,8 @@ impl<'a> Facets<'a> {
             corner,
             depth,
         };
-        let (block, facets) = (
-            |column, row| hits.block(column, row),
-            |prims: &_| self.of_block(prims),
-        );
-        lambert(self.level, &self.frame, &tile, block, facets, out);
+        let (block, facet) = (|column, row| hits.block(column, row), |prim| self.facet(prim));
+        lambert(self.level, &self.frame, &tile, block, facet, out);
     }
 }
 

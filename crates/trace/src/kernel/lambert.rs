@@ -43,17 +43,17 @@ pub(crate) struct LambertTile {
     pub(crate) depth: bool,
 }
 
-/// Shades the blocks of a tile; `block` gives ids and nearness or depth of the one in a column and a row, `facets` those of
-/// its triangles, 0 where there is none.
+/// Shades the blocks of a tile; `block` gives ids and nearness or depth of the one in a column and a row, `facet` a
+/// triangle's.
 pub(crate) fn lambert<'t>(
     level: SimdLevel,
     frame: &LambertFrame,
     tile: &LambertTile,
     block: impl Fn(u32, u32) -> (&'t [u32; LANES], &'t [f32; LANES]),
-    facets: impl Fn(&[u32; LANES]) -> [f32; LANES],
+    facet: impl Fn(u32) -> f32,
     out: &mut [[u8; LANES]],
 ) {
-    dispatch!(level.0, simd => lambert_impl(simd, frame, tile, &block, &facets, out));
+    dispatch!(level.0, simd => lambert_impl(simd, frame, tile, &block, &facet, out));
 }
 
 #[inline(always)]
@@ -62,7 +62,7 @@ fn lambert_impl<'t, S: Simd>(
     frame: &LambertFrame,
     tile: &LambertTile,
     block: &impl Fn(u32, u32) -> (&'t [u32; LANES], &'t [f32; LANES]),
-    facets: &impl Fn(&[u32; LANES]) -> [f32; LANES],
+    facet: &impl Fn(u32) -> f32,
     out: &mut [[u8; LANES]],
 ) {
     // What pixels of a block add to its first pixel's ray.
@@ -76,7 +76,9 @@ fn lambert_impl<'t, S: Simd>(
             *out = [BACKGROUND; LANES];
             continue;
         }
-        let mut value = f32x16::from_slice(simd, &facets(prims));
+        let uniform = lanes.simd_eq(u32x16::splat(simd, prims[0])).all_true();
+        let facets = facets_of(prims, uniform, facet);
+        let mut value = f32x16::from_slice(simd, &facets);
         if let Some(light) = frame.light {
             let corner = [tile.corner[0] + column * BLOCK, tile.corner[1] + row * BLOCK];
             let dir = affine(simd, &frame.dir, &dir, corner);
@@ -162,4 +164,21 @@ fn affine<S: Simd>(
         start[1] + offsets[1],
         start[2] + offsets[2],
     ]
+}
+
+/// One look-up for each triangle that successive pixels see.
+#[inline(always)]
+fn facets_of(prims: &[u32; LANES], uniform: bool, facet: &impl Fn(u32) -> f32) -> [f32; LANES] {
+    if uniform {
+        return [facet(prims[0]); LANES];
+    }
+    let mut facets = [0.0; LANES];
+    let mut last = (NONE, 0.0);
+    for (facets, &prim) in facets.iter_mut().zip(prims) {
+        if prim != last.0 {
+            last = (prim, if prim == NONE { 0.0 } else { facet(prim) });
+        }
+        *facets = last.1;
+    }
+    facets
 }
