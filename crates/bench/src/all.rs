@@ -30,6 +30,8 @@ pub struct AllOptions {
     pub level: SimdLevel,
     /// Folder of scenes, with a camera file.
     pub folder: Option<std::path::PathBuf>,
+    /// Scenes of frames and builds; unless there are any, the meshes of the folder or else the built-in ones.
+    pub scenes: Vec<String>,
 }
 
 /// All measurements.
@@ -73,6 +75,7 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         names.iter().map(|name| BenchScene::load(name, folder)).collect()
     };
     let names: Vec<&str> = match (quick, folder) {
+        _ if !options.scenes.is_empty() => options.scenes.iter().map(String::as_str).collect(),
         (true, _) => vec!["blob-1k"],
         (false, None) => crate::all_scenes(false).collect(),
         (false, Some(_)) => crate::all_scenes(true)

@@ -160,6 +160,8 @@ struct StructuresArgs {
 /// `rayward bench all`
 #[derive(Debug, Args)]
 struct AllArgs {
+    /// Scenes of frames and builds; the meshes of the scenes folder, or else the built-in scenes, unless given
+    scenes: Vec<String>,
     /// Small sizes only
     #[arg(long)]
     quick: bool,

@@ -41,7 +41,7 @@ mod error;
 mod ldc;
 mod secondary;
 #[cfg(test)]
-mod test_meshes;
+mod tests;
 
 pub use rayward_trace as trace;
 

@@ -194,6 +194,7 @@ fn run_all(args: &AllArgs) -> Result<(), Failure> {
         runs: args.run.runs as usize,
         level: SimdLevel::detect(),
         folder: folder(),
+        scenes: args.scenes.clone(),
     };
     let measured = all::measure(&options, &mut |what| args.run.progress(what))?;
     tell_document(&args.run, &measured, &measured.document(command()))?;

@@ -3,7 +3,7 @@
 use rayward_trace::{Accel, BruteForce, Bvh, Hit, Light, Ray, Receiver, Triangles};
 
 use super::GpuBvh;
-use crate::test_meshes::{Mesh, gpu, meshes, rays};
+use crate::tests::{Mesh, gpu, meshes, rays};
 
 /// One that knows nothing: every answer that is left is the device's own.
 struct Silent;

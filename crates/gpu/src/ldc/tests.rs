@@ -7,7 +7,7 @@ use rayward_trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, Te
 use rayward_trace::{Accel, BruteForce, Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, SurfaceRay};
 
 use super::{Cube, CubeOptions};
-use crate::test_meshes::{Mesh, Numbers, gpu, meshes, rays};
+use crate::tests::{Mesh, Numbers, gpu, meshes, rays};
 use crate::{Error, Gpu};
 
 const CENTRE: LdcBuild = LdcBuild::Csr(Coverage::Centre);
