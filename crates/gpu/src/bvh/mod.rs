@@ -105,13 +105,16 @@ impl<'a> GpuBvh<'a> {
         };
         let (layout, _) = layout(&frame, triangles.len(), &options);
         let [positions, indices] = upload(gpu, &frame, &triangles, &prims)?;
-        let nodes: Vec<Node> = bvh.nodes().iter().map(|node| Node::of(node, &frame)).collect();
+        let mut nodes: Vec<Node> = bvh.nodes().iter().map(|node| Node::of(node, &frame)).collect();
+        let empty = nodes.is_empty();
+        // A binding has room for one node at least.
+        nodes.resize(nodes.len().max(1), Node::zeroed());
         let leaves: Vec<u32> = bvh.leaf_prims().collect();
         Ok(Self {
             gpu,
             triangles,
             frame,
-            empty: nodes.is_empty(),
+            empty,
             layout: gpu.uniform("the frame of coordinates", &layout)?,
             positions,
             indices,
