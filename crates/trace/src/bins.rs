@@ -9,10 +9,7 @@
 use rayon::prelude::*;
 
 use crate::Triangles;
-use crate::kernel::batch::Bits;
-use crate::kernel::cells::{CellRects, cell_rects};
 use crate::kernel::project::RasterVertex;
-use crate::kernel::{LANES, SimdLevel};
 use crate::precise::PreciseTriangle;
 use crate::view::View;
 
@@ -61,7 +58,6 @@ const CHUNKS: usize = 16;
 impl Bins {
     /// Sorts those triangles of `prims` for which `keep` holds.
     pub(crate) fn build(
-        level: SimdLevel,
         view: &View,
         triangles: &Triangles,
         vertices: &[RasterVertex],
@@ -73,33 +69,15 @@ impl Bins {
         let chunk_size = count.div_ceil(CHUNKS).max(SMALLEST_CHUNK);
         let chunks = (0..count.div_ceil(chunk_size))
             .into_par_iter()
-            .map_init(<(CellRects, Vec<(u32, u32)>)>::default, |work, chunk| {
+            .map(|chunk| {
                 let prims = (chunk * chunk_size) as u32..((chunk + 1) * chunk_size).min(count) as u32;
-                let (rects, pairs) = work;
-                pairs.clear();
-                let mut finder = Finder {
-                    view,
-                    triangles,
-                    grid,
-                    binning,
-                    pairs,
-                };
-                for first in prims.clone().step_by(LANES) {
-                    let batch = first as usize..prims.end.min(first + LANES as u32) as usize;
-                    cell_rects(level, grid, vertices, &triangles.indices[batch], rects);
-                    for lane in Bits(rects.ahead | rects.crossing) {
-                        let prim = first + lane as u32;
-                        if !keep(prim) {
-                            continue;
-                        }
-                        if rects.ahead >> lane & 1 != 0 {
-                            finder.take_ahead(prim, rects.cells.map(|cells| cells[lane] as u32));
-                        } else {
-                            finder.take_crossing(prim);
-                        }
+                let mut pairs = Vec::with_capacity(prims.len());
+                for prim in prims {
+                    if keep(prim) {
+                        bin(view, triangles, vertices, grid, binning, prim, &mut pairs);
                     }
                 }
-                Chunk::sorted(pairs, (grid.cells[0] * grid.cells[1]) as usize)
+                Chunk::sorted(&pairs, (grid.cells[0] * grid.cells[1]) as usize)
             })
             .collect();
         Self { chunks }
@@ -169,98 +147,86 @@ impl Chunk {
 
 /// Raster points and vertices below the guard are known to 1/512 of a unit or better; a cell's triangles are those
 /// that come this close to it.
-pub(crate) const SLACK: f32 = 1.0 / 64.0;
+const SLACK: f32 = 1.0 / 64.0;
 
-/// What a task finds.
-struct Finder<'f> {
-    view: &'f View,
-    triangles: &'f Triangles<'f>,
-    grid: &'f CellGrid,
-    binning: Binning,
-    /// Cell and triangle of each reference.
-    pairs: &'f mut Vec<(u32, u32)>,
-}
-
-impl Finder<'_> {
-    /// Takes a triangle that lies in front, with the cells of its bounding rectangle: first column and row, last
-    /// column and row.
-    #[inline]
-    fn take_ahead(&mut self, prim: u32, cells: [u32; 4]) {
-        let [x0, y0, x1, y1] = cells;
-        if [x0, y0] == [x1, y1] {
-            self.pairs.push((y0 * self.grid.cells[0] + x0, prim));
-        } else if x1 <= x0 + 1 && y1 <= y0 + 1 || self.binning == Binning::Rectangle {
-            self.take_rectangle(prim, cells);
-        } else if let Some(precise) = PreciseTriangle::new(self.view, self.triangles.corners(prim)) {
-            self.take_rows(prim, &precise, cells);
+/// Inclusive cell rectangle of raster bounds; `None` if it holds nothing that matters.
+#[inline]
+fn cell_rect(grid: &CellGrid, min: [f32; 2], max: [f32; 2]) -> Option<[[u32; 2]; 2]> {
+    let mut rect = [[0; 2]; 2];
+    for axis in 0..2 {
+        let limit = grid.size[axis];
+        let (low, high) = (min[axis] - SLACK, max[axis] + SLACK);
+        // Written so that NaN is refused.
+        if !(low <= high && high >= 0.0 && low < limit) {
+            return None;
         }
-    }
-
-    /// Takes a triangle of which only f64 can tell where it lies.
-    #[cold]
-    fn take_crossing(&mut self, prim: u32) {
-        let Some(precise) = PreciseTriangle::new(self.view, self.triangles.corners(prim)) else {
-            return;
-        };
-        let bounds = precise.bounds(self.view);
-        let cells = bounds.and_then(|[min, max]| self.cells_of(min.map(|v| v as f32), max.map(|v| v as f32)));
-        let Some(cells) = cells else { return };
-        let [x0, y0, x1, y1] = cells;
-        if x1 <= x0 + 1 && y1 <= y0 + 1 || self.binning == Binning::Rectangle {
-            self.take_rectangle(prim, cells);
-        } else {
-            self.take_rows(prim, &precise, cells);
-        }
-    }
-
-    fn take_rectangle(&mut self, prim: u32, [x0, y0, x1, y1]: [u32; 4]) {
-        let columns = self.grid.cells[0];
-        for y in y0..=y1 {
-            self.pairs.extend((x0..=x1).map(|x| (y * columns + x, prim)));
-        }
-    }
-
-    /// Puts a triangle into those cells that its edges may reach.
-    fn take_rows(&mut self, prim: u32, precise: &PreciseTriangle, [x0, y0, x1, y1]: [u32; 4]) {
-        let (side, slack) = (f64::from(self.grid.side), f64::from(SLACK));
-        let columns = self.grid.cells[0];
-        for y in y0..=y1 {
-            let top = f64::from(y) * side;
-            let Some([from, to]) = precise.row_span(top - slack, top + side + slack) else {
-                continue;
-            };
-            let (from, to) = ((from - slack) / side, (to + slack) / side);
-            let column = |x: f64| x.clamp(f64::from(x0), f64::from(x1)) as u32;
-            if to >= f64::from(x0) && from <= f64::from(x1 + 1) {
-                self.pairs
-                    .extend((column(from)..=column(to)).map(|x| (y * columns + x, prim)));
-            }
-        }
-    }
-
-    /// First column and row, last column and row of the cells of raster bounds; `None` if they hold nothing that
-    /// matters. What [`cell_rects`] finds for what lies in front.
-    fn cells_of(&self, min: [f32; 2], max: [f32; 2]) -> Option<[u32; 4]> {
-        let grid = self.grid;
-        let mut cells = [0; 4];
-        for axis in 0..2 {
-            let limit = grid.size[axis];
-            let (low, high) = (min[axis] - SLACK, max[axis] + SLACK);
-            // Written so that NaN is refused.
-            if !(low <= high && high >= 0.0 && low < limit) {
+        let (mut low, mut high) = (low.max(0.0), high.min(limit));
+        if grid.pixel_centres {
+            // Half-integers within; conversions to integers cut off, and a function call each for `floor` and
+            // `ceil` would be a third of the cost of binning.
+            let last = (high + 0.5) as i32 - 1;
+            let first = (low - 0.5) as i32;
+            let first = first + i32::from((first as f32) < low - 0.5);
+            if first > last {
                 return None;
             }
-            let (mut low, mut high) = (low.max(0.0), high.min(limit));
-            if grid.pixel_centres {
-                (low, high) = ((low - 0.5).ceil(), (high + 0.5).floor() - 1.0);
-                if low > high {
-                    return None;
-                }
-            }
-            let last = grid.cells[axis] - 1;
-            cells[axis] = ((low / grid.side) as u32).min(last);
-            cells[axis + 2] = ((high / grid.side) as u32).min(last);
+            (low, high) = (first as f32, last as f32);
         }
-        Some(cells)
+        let last = grid.cells[axis] - 1;
+        rect[0][axis] = ((low / grid.side) as u32).min(last);
+        rect[1][axis] = ((high / grid.side) as u32).min(last);
+    }
+    Some(rect)
+}
+
+#[inline]
+fn bin(
+    view: &View,
+    triangles: &Triangles,
+    vertices: &[RasterVertex],
+    grid: &CellGrid,
+    binning: Binning,
+    prim: u32,
+    pairs: &mut Vec<(u32, u32)>,
+) {
+    let corners = triangles.indices[prim as usize].map(|i| &vertices[i as usize]);
+    if corners.iter().all(|v| v.nearness < 0.0) {
+        return;
+    }
+    let ahead = corners.iter().all(|v| v.nearness >= 0.0);
+    let mut precise = None;
+    let rect = if ahead {
+        let [a, b, c] = corners;
+        let min = [a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y)];
+        let max = [a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y)];
+        cell_rect(grid, min, max)
+    } else {
+        precise = PreciseTriangle::new(view, triangles.corners(prim));
+        let bounds = precise.as_ref().and_then(|p| p.bounds(view));
+        bounds.and_then(|[min, max]| cell_rect(grid, min.map(|v| v as f32), max.map(|v| v as f32)))
+    };
+    let Some([[x0, y0], [x1, y1]]) = rect else { return };
+    let columns = grid.cells[0];
+    let large = x1 > x0 + 1 || y1 > y0 + 1;
+    if !large || binning == Binning::Rectangle {
+        for y in y0..=y1 {
+            pairs.extend((x0..=x1).map(|x| (y * columns + x, prim)));
+        }
+        return;
+    }
+    let Some(precise) = precise.or_else(|| PreciseTriangle::new(view, triangles.corners(prim))) else {
+        return;
+    };
+    let side = f64::from(grid.side);
+    for y in y0..=y1 {
+        let (top, slack) = (f64::from(y) * side, f64::from(SLACK));
+        let Some([from, to]) = precise.row_span(top - slack, top + side + slack) else {
+            continue;
+        };
+        let (from, to) = ((from - slack) / side, (to + slack) / side);
+        let column = |x: f64| x.clamp(f64::from(x0), f64::from(x1)) as u32;
+        if to >= f64::from(x0) && from <= f64::from(x1 + 1) {
+            pairs.extend((column(from)..=column(to)).map(|x| (y * columns + x, prim)));
+        }
     }
 }

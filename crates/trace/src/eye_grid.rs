@@ -177,7 +177,7 @@ impl<'a> EyeGrid<'a> {
     ) -> Self {
         let grid = cells(&view, &options);
         let vertices = project_all(level, &view, &triangles);
-        let bins = Bins::build(level, &view, &triangles, &vertices, &grid, options.binning, keep);
+        let bins = Bins::build(&view, &triangles, &vertices, &grid, options.binning, keep);
         let content = Content::Triangles { vertices, bins };
         Self::new(view, triangles, grid, content, options, level)
     }

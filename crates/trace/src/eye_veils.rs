@@ -76,15 +76,7 @@ impl<'a> EyeVeils<'a> {
             pixel_centres: true,
         };
         let vertices = project_all(level, &view, &triangles);
-        let mut bins = Bins::build(
-            level,
-            &view,
-            &triangles,
-            &vertices,
-            &grid,
-            Binning::Overlap,
-            is_veil,
-        );
+        let mut bins = Bins::build(&view, &triangles, &vertices, &grid, Binning::Overlap, is_veil);
         let prims = bins.number_references(triangles.len());
         Self {
             view,

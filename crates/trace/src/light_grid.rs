@@ -403,7 +403,7 @@ impl Face {
             pixel_centres: false,
         };
         let vertices = project_all(level, &view, triangles);
-        let mut bins = Bins::build(level, &view, triangles, &vertices, &grid, options.binning, keep);
+        let mut bins = Bins::build(&view, triangles, &vertices, &grid, options.binning, keep);
         let prims = bins.number_references(triangles.len());
         let casters = set_up_all(level, &view, triangles, &vertices, &prims);
         let nearest = nearest_per_cell(&view, triangles, &vertices, &bins, &prims, &casters);

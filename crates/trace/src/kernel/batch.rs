@@ -252,7 +252,7 @@ fn draw_batch<S: Simd>(
 }
 
 /// Positions of the bits that are set.
-pub(crate) struct Bits(pub(crate) u32);
+pub(super) struct Bits(pub(super) u32);
 
 impl Iterator for Bits {
     type Item = usize;

@@ -9,7 +9,7 @@ use fearless_simd::{Simd, dispatch, f32x16, prelude::*};
 use super::batch::{
     BatchLanes, Bits, TilePlace, TriangleQueue, block_range, corner_lanes, pixel_range, up_to_four,
 };
-use super::project::{interleave, project_lanes};
+use super::project::project_lanes;
 use super::tile::{BlockRect, TileBuffer, hides};
 use super::{LANES, NEARNESS_BAND, SimdLevel, bits_of, max3, min3};
 use crate::clusters::CLUSTER;
@@ -121,8 +121,18 @@ fn project<S: Simd>(
             f32x16::from_slice(simd, &points[1]),
             f32x16::from_slice(simd, &points[2]),
         ];
-        let projected = project_lanes(simd, view, points, origin);
-        interleave(projected, out.as_flattened_mut());
+        let (projected, rests) = project_lanes(simd, view, points, origin);
+        let [x, y, nearness] = projected;
+        let rests = rests.bitcast::<f32x16<S>>();
+        let (x_low, x_high) = x.interleave(nearness);
+        let (y_low, y_high) = y.interleave(rests);
+        let words = out.as_flattened_mut();
+        let (first, second) = x_low.interleave(y_low);
+        let (third, fourth) = x_high.interleave(y_high);
+        first.store_slice(&mut words[..LANES]);
+        second.store_slice(&mut words[LANES..2 * LANES]);
+        third.store_slice(&mut words[2 * LANES..3 * LANES]);
+        fourth.store_slice(&mut words[3 * LANES..]);
     }
 }
 

@@ -12,7 +12,6 @@ pub(crate) mod askers;
 pub(crate) mod batch;
 pub(crate) mod bundles;
 pub(crate) mod casters;
-pub(crate) mod cells;
 pub(crate) mod cluster;
 pub(crate) mod cover;
 pub(crate) mod edges;

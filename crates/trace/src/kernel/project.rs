@@ -82,11 +82,20 @@ fn project_impl<S: Simd>(
             [padded(simd, x), padded(simd, y), padded(simd, z)]
         };
         let vertices = project_lanes(simd, view, points, [0.0; 2]);
-        let mut words = [[0.0; 4]; LANES];
-        interleave(vertices, words.as_flattened_mut());
-        for (vertex, [x, y, nearness, rest]) in out.iter_mut().zip(words) {
-            let rest = rest.to_bits() as i32;
-            *vertex = RasterVertex { x, y, nearness, rest };
+        let [x, y, nearness] = vertices.0;
+        let (x, y, nearness) = (
+            <[f32; LANES]>::from(x),
+            <[f32; LANES]>::from(y),
+            <[f32; LANES]>::from(nearness),
+        );
+        let rest = <[i32; LANES]>::from(vertices.1);
+        for (i, vertex) in out.iter_mut().enumerate() {
+            *vertex = RasterVertex {
+                x: x[i],
+                y: y[i],
+                nearness: nearness[i],
+                rest: rest[i],
+            };
         }
     }
 }
@@ -129,19 +138,6 @@ pub(crate) fn project_lanes<S: Simd>(
     let low_half = i32x16::splat(simd, 0xffff);
     let rests = (x_rest.to_int::<i32x16<S>>() & low_half) | (y_rest.to_int::<i32x16<S>>() << 16);
     ([x, y, known.select(marked, f32x16::splat(simd, f32::NAN))], rests)
-}
-
-/// x, y, nearness and rests of each point together.
-#[inline(always)]
-pub(crate) fn interleave<S: Simd>(([x, y, nearness], rests): ([f32x16<S>; 3], i32x16<S>), words: &mut [f32]) {
-    let (x_low, x_high) = x.interleave(nearness);
-    let (y_low, y_high) = y.interleave(rests.bitcast::<f32x16<S>>());
-    let (first, second) = x_low.interleave(y_low);
-    let (third, fourth) = x_high.interleave(y_high);
-    first.store_slice(&mut words[..LANES]);
-    second.store_slice(&mut words[LANES..2 * LANES]);
-    third.store_slice(&mut words[2 * LANES..3 * LANES]);
-    fourth.store_slice(&mut words[3 * LANES..]);
 }
 
 /// What rounding to f32 cut off, in units of [`REST`].
