@@ -188,7 +188,7 @@ fn line(scene: &BenchScene, rays: &[Ray], resolution: u32, runs: usize) -> CubeL
     let test = HitTest::Plane { margin: 0.25 };
     let (planes_ms, planes) = timed(runs, || {
         hits(rays, |ray| {
-            let hit = cube.closest_sampled(ray, test, &mut ());
+            let hit = centred.closest_sampled(ray, test, &mut ());
             hit.map(|hit| (hit.prim, f64::from(hit.t)))
         })
     });

@@ -130,7 +130,8 @@ fn curves(svg: &mut String, axes: &[String; 2], series: &[Series]) -> Drawn {
         )?;
     chart
         .configure_mesh()
-        .light_line_style(RGBColor(240, 240, 240))
+        .max_light_lines(1)
+        .light_line_style(WHITE)
         .bold_line_style(RGBColor(215, 215, 215))
         .x_desc(&axes[0])
         .y_desc(&axes[1])

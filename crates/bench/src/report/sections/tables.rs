@@ -26,7 +26,7 @@ pub fn tables(report: &TablesReport) -> Vec<Section> {
             short => format!("{short} fall short."),
         };
         let text = format!("{} claims. {missed}", claims.len());
-        Section::new(title).text(text).table("", verdicts(claims))
+        Section::new(title).text(text).list(verdicts(claims))
     };
     let [width, height] = report.size;
     let raster = &report.raster;
@@ -58,18 +58,17 @@ pub fn tables(report: &TablesReport) -> Vec<Section> {
     ]
 }
 
-fn verdicts(claims: &[Claim]) -> Table {
-    let mut table = Table::new(&["verdict", "claim", "figures"]);
-    for claim in claims {
+fn verdicts(claims: &[Claim]) -> Vec<String> {
+    let line = |claim: &Claim| {
         let verdict = match claim.verdict {
             Verdict::Exceeded => "exceeded",
             Verdict::Reproduced => "reproduced",
             Verdict::Not => "NOT",
             Verdict::NotMeasured => "not measured",
         };
-        table.row(vec![verdict.into(), claim.claim.into(), claim.figures.clone()]);
-    }
-    table
+        format!("{verdict}: {}: {}", claim.claim, claim.figures)
+    };
+    claims.iter().map(line).collect()
 }
 
 fn table_1(report: &TablesReport) -> Plot {
