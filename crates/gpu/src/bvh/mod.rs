@@ -69,7 +69,7 @@ impl Node {
     }
 }
 
-/// A hierarchy over the triangles of one frame, in a GPU's memory. See the [module](self).
+/// A hierarchy over the triangles of one frame, in a GPU's memory.
 #[derive(Debug)]
 pub struct GpuBvh<'a> {
     gpu: &'a Gpu,
