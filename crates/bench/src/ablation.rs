@@ -146,6 +146,6 @@ fn soft_ways(usual: Ways) -> [Ways; 2] {
     let (sheets, followed) = (false, Some(FaceOptions::paper()));
     [
         named("no sheets", Ways { sheets, ..usual }),
-        named("HM08's grid, ray by ray", Ways { followed, ..usual }),
+        named("HM08's grid", Ways { followed, ..usual }),
     ]
 }

@@ -7,9 +7,9 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 use rayward::trace::{
-    AreaLightTree, AreaScratch, BLOCK_LANES, Candidates, Casts, EyeGrid, EyeGridOptions, FaceOptions, Facets,
-    Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PerspectiveGrids, PointLightGrid, Receiver,
-    SeenTile, ShadowScratch, SimdLevel, Tile, TileHits, TileSamples, Visibility, darken, darken_unlit, exact,
+    AreaLightGrid, AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, FaceOptions,
+    Facets, Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PointLightGrid, Receiver, SeenTile,
+    ShadowScratch, SimdLevel, Tile, TileHits, TileSamples, Visibility, darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
@@ -31,7 +31,7 @@ pub(crate) struct Ways {
     pub(crate) looked_up: Option<LightGridOptions>,
     /// Whether memory is kept from frame to frame.
     pub(crate) keeps_memory: bool,
-    /// Grids in which soft shadows are followed ray by ray, instead of a tree.
+    /// Grids through which soft shadows are followed, instead of a tree.
     pub(crate) followed: Option<FaceOptions>,
     /// Whether the tree knows which triangles share edges.
     pub(crate) sheets: bool,
@@ -257,7 +257,7 @@ impl Rayward {
     }
 }
 
-/// Soft shadows ray by ray through perspective grids around the middle of the light.
+/// Soft shadows through perspective grids around the middle of the light.
 fn draw_followed(
     job: &Job,
     eye: &EyeGrid,
@@ -265,21 +265,18 @@ fn draw_followed(
     options: &FaceOptions,
     picture: &mut Picture,
 ) -> u64 {
-    let center = job.area_center().as_dvec3();
-    let grids = PerspectiveGrids::build(center, job.scene.triangles(), options);
+    let grids = AreaLightGrid::build(job.area, job.scene.triangles(), &|_| Casts::Both, options);
     let tiles = picture.tiles_mut().map_init(AskingWork::default, |work, out| {
         let tile = eye.tile(out.index);
         eye.trace_tile(&tile, &mut work.hits);
         facets.shade(&work.hits, out.corner, out.stride, out.blocks);
         work.receive(facets, &tile, job);
-        let asked = work.places.iter().zip(&work.receivers).zip(&work.pixels);
-        for ((&[block, lane], receiver), &pixel) in asked {
-            let lit = |&k: &u32| {
-                let end = job.area.sample(&job.samples, pixel, receiver.point, k);
-                job.area.shines_at(receiver.point) && !grids.shadows(receiver, &end, &mut ())
-            };
-            let count = (0..job.samples.count()).filter(lit).count() as u32;
-            work.lit[block][lane] = (count * SOFT_SAMPLES / job.samples.count()) as u8;
+        let (receivers, pixels, samples) = (&work.receivers, &work.pixels, &job.samples);
+        grids.visible(receivers, pixels, samples, &mut work.area, &mut work.bits);
+        let bits = work.bits.chunks(samples.words());
+        for (&[block, lane], bits) in work.places.iter().zip(bits) {
+            let count: u32 = bits.iter().map(|bits| bits.count_ones()).sum();
+            work.lit[block][lane] = (count * SOFT_SAMPLES / samples.count()) as u8;
         }
         for (block, lit) in out.blocks.iter_mut().zip(&work.lit) {
             darken(block, lit, SOFT_SAMPLES as u8);
@@ -307,6 +304,8 @@ struct AskingWork {
     places: Vec<[usize; 2]>,
     scratch: ShadowScratch,
     shadow: Vec<bool>,
+    area: AreaScratch,
+    bits: Vec<u32>,
     /// How much light the pixels of each block get.
     lit: Vec<[u8; BLOCK_LANES]>,
 }

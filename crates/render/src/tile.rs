@@ -464,8 +464,7 @@ impl TileShader<'_> {
             return true;
         };
         let corners = triangles(self.geometry).corners(receiver.prim);
-        let (lit, seen) = (exact::side(corners, &plan.light), exact::side(corners, &self.eye));
-        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+        exact::same_side(corners, &plan.light, &self.eye)
     }
 
     /// Share of a light that masked and blended triangles let through to each receiver. The product is taken in the

@@ -150,6 +150,13 @@ pub fn side(corners: [Vec3; 3], light: &Light) -> f64 {
     }
 }
 
+/// Whether a light and an eye are on the same side of a triangle; one that is seen edge-on by either has none.
+#[inline]
+pub fn same_side(corners: [Vec3; 3], light: &Light, eye: &Light) -> bool {
+    let (lit, seen) = (side(corners, light), side(corners, eye));
+    (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+}
+
 /// Whether triangle `prim` lies strictly between a receiver and a light, the receiver's own triangle and its
 /// error bound left out.
 #[inline]

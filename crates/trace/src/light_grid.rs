@@ -221,10 +221,7 @@ impl<'a> PointLightGrid<'a> {
             let face = |view| Face::build(view, over, &keep, &options, level);
             grid.faces = faces.views.into_iter().map(face).collect();
         } else {
-            let prims = 0..triangles.len() as u32;
-            let casts = |&prim: &u32| takes_part(&light, &triangles, rule(prim), prim);
-            let finite = |&prim: &u32| triangles.corners(prim).iter().all(|c| c.is_finite());
-            grid.unprojected = prims.filter(finite).filter(casts).collect();
+            grid.unprojected = finite_casters(&light, &triangles, rule);
         }
         grid
     }
@@ -260,10 +257,7 @@ impl<'a> PointLightGrid<'a> {
         shadow.resize(receivers.len(), false);
         if !self.unprojected.is_empty() {
             scratch.counts.receivers += receivers.len() as u64;
-            for (receiver, shadow) in receivers.iter().zip(shadow) {
-                let hides = |&prim: &u32| exact::shadows(&self.triangles, prim, receiver, &self.light);
-                *shadow = receiver.point.is_finite() && self.unprojected.iter().any(hides);
-            }
+            shadowed_one_by_one(&self.light, &self.triangles, &self.unprojected, receivers, shadow);
             return;
         }
         self.sort_into_cells(receivers, scratch, |i| shadow[i] = true);
@@ -495,6 +489,28 @@ fn survey(vertices: &[RasterVertex], triangles: &Triangles, receivers: u64) -> u
         }
     }
     extents.resolution(receivers as f64)
+}
+
+/// The casters of a light that cannot be projected: all that are finite.
+pub(crate) fn finite_casters(light: &Light, triangles: &Triangles, rule: CastRule) -> Vec<u32> {
+    let casts = |&prim: &u32| takes_part(light, triangles, rule(prim), prim);
+    let finite = |&prim: &u32| triangles.corners(prim).iter().all(|c| c.is_finite());
+    let prims = 0..triangles.len() as u32;
+    prims.filter(finite).filter(casts).collect()
+}
+
+/// Which receivers any of these casters hides from a light, each tested with each.
+pub(crate) fn shadowed_one_by_one(
+    light: &Light,
+    triangles: &Triangles,
+    casters: &[u32],
+    receivers: &[Receiver],
+    shadow: &mut [bool],
+) {
+    for (receiver, shadow) in receivers.iter().zip(shadow) {
+        let hides = |&prim: &u32| exact::shadows(triangles, prim, receiver, light);
+        *shadow = receiver.point.is_finite() && casters.iter().any(hides);
+    }
 }
 
 /// Whether a triangle is put into the grid.

@@ -2,13 +2,12 @@
 
 use glam::{DVec3, Vec3};
 use rayward::trace::{
-    BLOCK_LANES, EyeGrid, Light, Ray, Receiver, Samples, SimdLevel, TileHits, View, ViewRay, Visibility,
-    exact,
+    BLOCK_LANES, Light, Ray, Receiver, Samples, SimdLevel, View, ViewRay, Visibility, exact, sequence_point,
 };
 
 use super::StructuresOptions;
 use crate::contender::{FrameKind, Job, SOFT_SAMPLES, sample_set};
-use crate::ours::eye_grid;
+use crate::ours::{eye_grid, tile_side};
 use crate::{BenchScene, Result};
 
 /// A class of rays; see the [module](super).
@@ -115,6 +114,8 @@ pub(super) struct RaySet<'s> {
     pub(super) job: Job<'s>,
     /// Pixels of the rays, or of the receivers.
     pub(super) pixels: Vec<[u32; 2]>,
+    /// What the eye sees, where rays start there.
+    pub(super) visibility: Option<Visibility>,
 }
 
 impl<'s> RaySet<'s> {
@@ -129,17 +130,21 @@ impl<'s> RaySet<'s> {
         let width = (columns.ceil() as u32).max(1) * 16;
         let height = pixels.div_ceil(width).next_multiple_of(16);
         let job = Job::new(scene, [width, height], FrameKind::EyeSoft, options.level)?;
+        let mut seen = None;
         let (pixels, asked) = match class {
             RayClass::Eye => eye(&job.view),
             RayClass::Random => (Vec::new(), Asked::Closest(random(scene, options.rays))),
             RayClass::Through => (Vec::new(), Asked::All(random(scene, options.rays))),
-            RayClass::Hard | RayClass::Soft | RayClass::Reflection => from_surfaces(&job, class),
+            RayClass::Hard | RayClass::Soft | RayClass::Reflection => {
+                from_surfaces(&job, seen.insert(visibility(&job)), class)
+            }
         };
         Ok(Self {
             class,
             asked,
             job,
             pixels,
+            visibility: seen,
         })
     }
 }
@@ -164,31 +169,27 @@ fn eye(view: &View) -> (Vec<[u32; 2]>, Asked) {
     (pixels, Asked::Closest(rays))
 }
 
-/// Triangles that pixels see, by column and row.
-pub(super) fn seen(grid: &EyeGrid, view: &View) -> Vec<Option<u32>> {
-    let mut seen = vec![None; (view.width * view.height) as usize];
-    let mut hits = TileHits::default();
-    for index in 0..grid.tile_count() {
-        let tile = grid.tile(index);
-        grid.trace_tile(&tile, &mut hits);
-        for (y, x) in (0..tile.height).flat_map(|y| (0..tile.width).map(move |x| (y, x))) {
-            seen[((tile.y + y) * view.width + tile.x + x) as usize] = hits.prim(x, y);
-        }
-    }
-    seen
+/// The tile of a pixel, and where in it the pixel is.
+pub(super) fn in_tile(view: &View, [x, y]: [u32; 2]) -> [u32; 3] {
+    let side = tile_side();
+    [
+        y / side * view.width.div_ceil(side) + x / side,
+        x % side,
+        y % side,
+    ]
 }
 
-fn from_surfaces(job: &Job, class: RayClass) -> (Vec<[u32; 2]>, Asked) {
+fn from_surfaces(job: &Job, visibility: &Visibility, class: RayClass) -> (Vec<[u32; 2]>, Asked) {
     let (view, triangles, facets) = (&job.view, job.scene.triangles(), job.facets());
-    let prims = seen(&eye_grid(job), view);
     let (mut pixels, mut receivers, mut mirrored) = (Vec::new(), Vec::new(), Vec::new());
     let (low, high) = job.scene.geometry.bounds().unwrap_or_default();
     let start = (high - low).length() * 1e-4;
-    for [x, y] in in_squares(view) {
-        let Some(prim) = prims[(y * view.width + x) as usize] else {
+    for pixel in in_squares(view) {
+        let [tile, x, y] = in_tile(view, pixel);
+        let Some(prim) = visibility.prim(tile, x, y) else {
             continue;
         };
-        let ray = view.pixel_ray(x, y);
+        let ray = view.pixel_ray(pixel[0], pixel[1]);
         let corners = triangles.corners(prim);
         let Some(hit) = exact::attributes(ray.origin, ray.dir, corners) else {
             continue;
@@ -200,7 +201,7 @@ fn from_surfaces(job: &Job, class: RayClass) -> (Vec<[u32; 2]>, Asked) {
             continue;
         }
         receivers.push(receiver);
-        pixels.push([x, y]);
+        pixels.push(pixel);
     }
     let asked = match class {
         RayClass::Reflection => Asked::Closest(mirrored),
@@ -240,16 +241,9 @@ fn to_samples(job: &Job, pixels: &[[u32; 2]], receivers: &[Receiver]) -> Vec<(Re
 fn random(scene: &BenchScene, count: u32) -> Vec<Ray> {
     let (low, high) = scene.geometry.bounds().unwrap_or_default();
     let (middle, half) = ((low + high) * 0.5, (high - low) * 0.55);
-    let mut state = 1u64;
-    let mut number = move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-    };
-    let mut point = move || middle + half * Vec3::new(number(), number(), number());
-    let ray = |_| {
-        let (from, to) = (point(), point());
+    let ray = |i: u32| {
+        let [[a, b], [c, d], [e, f]] = [1, 2, 3].map(|pair| sequence_point([0, 0, pair], i));
+        let [from, to] = [Vec3::new(a, b, c), Vec3::new(d, e, f)].map(|p| middle + half * (p * 2.0 - 1.0));
         Ray::new(from, to - from)
     };
     (0..count).map(ray).collect()
@@ -266,10 +260,12 @@ pub(crate) fn mirrored_rays(
 ) -> Result<Vec<Ray>> {
     let size = [width, height].map(|side| side.next_multiple_of(16));
     let job = Job::new(scene, size, FrameKind::Eye, level)?;
-    Ok(match from_surfaces(&job, RayClass::Reflection).1 {
-        Asked::Closest(rays) => rays,
-        Asked::All(_) | Asked::Shadow(_) => Vec::new(),
-    })
+    Ok(
+        match from_surfaces(&job, &visibility(&job), RayClass::Reflection).1 {
+            Asked::Closest(rays) => rays,
+            Asked::All(_) | Asked::Shadow(_) => Vec::new(),
+        },
+    )
 }
 
 /// What the eye sees, as [`Visibility`].

@@ -1,15 +1,14 @@
 //! Everybody who answers rays.
 
-use std::sync::Mutex;
-
 use rayward::trace::ldc::{HitTest, Steps};
+use rayward::trace::space::World;
 use rayward::trace::{
     Accel, AreaLightTree, AreaScratch, BruteForce, Bvh, Candidates, Casts, Count, Counters, FaceOptions,
-    Grid3, Ldc, LdcOptions, Light, LightGridOptions, PerspectiveGrids, PointLightGrid, Ray, Receiver,
-    ShadowScratch, SimdLevel,
+    Grid3, Hit, Ldc, LdcOptions, Light, LightGridOptions, PerspectiveGrids, PointLightGrid, Ray, Receiver,
+    ShadowScratch, SimdLevel, exact,
 };
 
-use super::rays::{Answer, Asked, RaySet, seen, visibility};
+use super::rays::{Answer, Asked, RaySet, in_tile, visibility};
 use super::{RayClass, Structure, StructuresOptions};
 use crate::contender::{FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::embree::{Library, Quality};
@@ -118,39 +117,28 @@ pub(super) fn all<'s>(
 pub(crate) trait General: Send + Sync {
     fn closest(&self, ray: &Ray, count: &mut impl Count) -> Option<f64>;
     fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool;
-    fn hits(&self, ray: &Ray, scratch: &mut Vec<rayward::trace::Hit>);
+    fn hits(&self, ray: &Ray, scratch: &mut Vec<Hit>);
 }
 
-impl General for Bvh<'_> {
-    fn closest(&self, ray: &Ray, count: &mut impl Count) -> Option<f64> {
-        Bvh::closest(self, ray, count).map(|(_, hit)| hit.t)
-    }
-    fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool {
-        Bvh::shadows(self, receiver, light, count)
-    }
-    fn hits(&self, ray: &Ray, scratch: &mut Vec<rayward::trace::Hit>) {
-        self.all_hits(ray, scratch);
-    }
-}
-
-/// What proposes candidates.
-macro_rules! general_grid {
-    ($grid:ty) => {
-        impl General for $grid {
+/// By the methods of this type or trait, which take the counter as it is.
+macro_rules! general {
+    ($structure:ty, $methods:ident) => {
+        impl General for $structure {
             fn closest(&self, ray: &Ray, count: &mut impl Count) -> Option<f64> {
-                Candidates::closest(self, ray, count).map(|(_, hit)| hit.t)
+                $methods::closest(self, ray, count).map(|(_, hit)| hit.t)
             }
             fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool {
-                Candidates::shadows(self, receiver, light, count)
+                $methods::shadows(self, receiver, light, count)
             }
-            fn hits(&self, ray: &Ray, scratch: &mut Vec<rayward::trace::Hit>) {
+            fn hits(&self, ray: &Ray, scratch: &mut Vec<Hit>) {
                 self.all_hits(ray, scratch);
             }
         }
     };
 }
-general_grid!(Grid3<'_, rayward::trace::space::World>);
-general_grid!(PerspectiveGrids<'_>);
+general!(Bvh<'_>, Bvh);
+general!(Grid3<'_, World>, Candidates);
+general!(PerspectiveGrids<'_>, Candidates);
 
 /// Cells and texels as nodes.
 struct Nodes<'c, C>(&'c mut C);
@@ -175,7 +163,7 @@ impl General for Ldc<'_> {
     fn shadows(&self, receiver: &Receiver, light: &Light, count: &mut impl Count) -> bool {
         Ldc::shadows(self, receiver, light, &mut Nodes(count))
     }
-    fn hits(&self, ray: &Ray, scratch: &mut Vec<rayward::trace::Hit>) {
+    fn hits(&self, ray: &Ray, scratch: &mut Vec<Hit>) {
         self.all_hits(ray, scratch);
     }
 }
@@ -283,17 +271,17 @@ fn eye_rays<'s>(job: &Job) -> Subject<'s> {
         if set.class != RayClass::Eye {
             return false;
         }
-        let view = &set.job.view;
-        let prims = seen(&eye_grid(&set.job), view);
         let Asked::Closest(rays) = &set.asked else {
             return false;
         };
+        let visibility = visibility(&set.job);
         answers.clear();
         let triangles = set.job.scene.triangles();
-        answers.extend(set.pixels.iter().zip(rays).map(|(&[x, y], ray)| {
-            let prim = prims[(y * view.width + x) as usize];
+        answers.extend(set.pixels.iter().zip(rays).map(|(&pixel, ray)| {
+            let [tile, x, y] = in_tile(&set.job.view, pixel);
+            let prim = visibility.prim(tile, x, y);
             let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-            let attributes = |prim| rayward::trace::exact::attributes(origin, dir, triangles.corners(prim));
+            let attributes = |prim| exact::attributes(origin, dir, triangles.corners(prim));
             Answer::closest(prim.and_then(attributes).map(|at| at.t))
         }));
         true
@@ -302,32 +290,19 @@ fn eye_rays<'s>(job: &Job) -> Subject<'s> {
 
 fn lit_pixels<'s>(job: &Job) -> Subject<'s> {
     let ours = Rayward::new(Ways::usual());
-    let seen_by: Mutex<Option<([u32; 2], rayward::trace::Visibility)>> = Mutex::new(None);
     let build = Stopwatch::time(|| ours.lit(job, &visibility(job), job.light)).1;
     let what =
         "receivers of all pixels in the light's raster, casters over them; it is all in the time of its rays";
     at_once("lit pixels", what, (build, None), move |set, answers| {
-        if set.class != RayClass::Hard {
-            return false;
-        }
-        let view = &set.job.view;
-        let size = [view.width, view.height];
-        let mut seen_by = seen_by.lock().expect("no light panics");
         // What the eye sees is no part of the question.
-        if seen_by.as_ref().is_none_or(|(of, _)| *of != size) {
-            *seen_by = Some((size, visibility(&set.job)));
-        }
-        let (_, visibility) = seen_by.as_ref().expect("it was made");
+        let (RayClass::Hard, Some(visibility)) = (set.class, &set.visibility) else {
+            return false;
+        };
         let lit = ours.lit(&set.job, visibility, set.job.light);
-        let side = crate::ours::tile_side();
-        let columns = view.width.div_ceil(side);
         answers.clear();
-        answers.extend(set.pixels.iter().map(|&[x, y]| {
-            let tile = y / side * columns + x / side;
-            let width = side.min(view.width - x / side * side).div_ceil(4);
-            let [column, row] = [x % side, y % side];
-            let bits = lit.blocks(tile)[(row / 4 * width + column / 4) as usize];
-            Answer::shadow(bits >> (row % 4 * 4 + column % 4) & 1 == 0)
+        answers.extend(set.pixels.iter().map(|&pixel| {
+            let [tile, x, y] = in_tile(&set.job.view, pixel);
+            Answer::shadow(!lit.is_lit(tile, x, y))
         }));
         true
     })

@@ -190,11 +190,7 @@ impl TileShader<'_> {
             return true;
         }
         let corners = triangles(self.geometry).corners(arrival.receiver.prim);
-        let (lit, seen) = (
-            exact::side(corners, end),
-            exact::side(corners, &arrival.seen_from),
-        );
-        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+        exact::same_side(corners, end, &arrival.seen_from)
     }
 }
 

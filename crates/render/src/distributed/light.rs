@@ -74,17 +74,13 @@ impl Frame<'_> {
         if seen.surface.unlit || !area.shines_at(seen.receiver.point) {
             return Vec3::ZERO;
         }
-        let whole = direct(seen.surface, &light.shading).filter(|_| self.options.paper);
+        let whole = self.options.paper.then(|| direct(seen.surface, &light.shading));
         let samples = soft::samples(self.options, index, ray.sample);
         let mut sum = Vec3::ZERO;
         for k in 0..samples.count() {
             let end = area.sample(&samples, ray.pixel, seen.receiver.point, k);
-            let sent = if self.options.paper {
-                whole
-            } else {
-                direct_from(seen.surface, &light.shading, area, &end)
-            };
-            if let Some(incident) = sent {
+            let each = || direct_from(seen.surface, &light.shading, area, &end);
+            if let Some(incident) = whole.unwrap_or_else(each) {
                 sum += incident.radiance * self.reached(seen, light, &end, ray.time, work);
             }
         }
@@ -95,8 +91,7 @@ impl Frame<'_> {
     fn reached(&self, seen: &Seen, light: &FrameLight, end: &Light, time: f64, work: &mut Work) -> Vec3 {
         if seen.on.is_none() {
             let corners = self.moving.corners(seen.receiver.prim, time);
-            let (lit, sees) = (exact::side(corners, end), exact::side(corners, &seen.from));
-            if !((lit > 0.0 && sees > 0.0) || (lit < 0.0 && sees < 0.0)) {
+            if !exact::same_side(corners, end, &seen.from) {
                 return Vec3::ZERO;
             }
         }

@@ -140,7 +140,6 @@ impl TileShader<'_> {
     /// As [`Self::faces`], for a sample.
     fn faces_end(&self, end: &Light, receiver: &Receiver) -> bool {
         let corners = triangles(self.geometry).corners(receiver.prim);
-        let (lit, seen) = (exact::side(corners, end), exact::side(corners, &self.eye));
-        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+        exact::same_side(corners, end, &self.eye)
     }
 }

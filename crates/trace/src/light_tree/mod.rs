@@ -22,7 +22,9 @@ use crate::kernel::light_tree::{CASTER, Node, walk};
 use crate::kernel::points::Caster;
 use crate::kernel::project::RasterVertex;
 use crate::kernel::{LANES, NEARNESS_BAND, SimdLevel};
-use crate::light_grid::{CastRule, Cone, ShadowScratch, locate, set_up_all, takes_part};
+use crate::light_grid::{
+    CastRule, Cone, ShadowScratch, finite_casters, locate, set_up_all, shadowed_one_by_one, takes_part,
+};
 use crate::precise::PreciseTriangle;
 use crate::view::View;
 use crate::{Light, Receiver, Triangles};
@@ -90,9 +92,7 @@ impl<'a> PointLightTree<'a> {
             };
             tree.faces = faces.views.into_iter().map(face).collect();
         } else {
-            let finite = |&prim: &u32| triangles.corners(prim).iter().all(|c| c.is_finite());
-            let prims = (0..triangles.len() as u32).filter(finite);
-            tree.unprojected = prims.filter(|&prim| takes_part(prim)).collect();
+            tree.unprojected = finite_casters(&light, &triangles, rule);
         }
         tree
     }
@@ -134,10 +134,7 @@ impl<'a> PointLightTree<'a> {
         shadow.resize(receivers.len(), false);
         scratch.counts.receivers += receivers.len() as u64;
         if !self.unprojected.is_empty() {
-            for (receiver, shadow) in receivers.iter().zip(shadow) {
-                let hides = |&prim: &u32| exact::shadows(&self.triangles, prim, receiver, &self.light);
-                *shadow = receiver.point.is_finite() && self.unprojected.iter().any(hides);
-            }
+            shadowed_one_by_one(&self.light, &self.triangles, &self.unprojected, receivers, shadow);
             return;
         }
         let mut waiting = Waiting::default();

@@ -114,7 +114,7 @@ pub(super) fn gather(
         part.asked.clear();
         work.entries.clear();
         for (i, tile) in tiles.iter().enumerate() {
-            let plane = |prim, corners| query.plane(visibility.view(), triangles, prim, corners);
+            let plane = |_, corners| query.plane(visibility.view(), corners);
             work.find(visibility.view(), triangles, tile, plane, level);
             let asking = Asking {
                 eye_tile: (index * size + i) as u32,

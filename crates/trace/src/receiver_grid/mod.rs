@@ -247,21 +247,19 @@ impl LitPixels {
 
 impl LightQuery<'_> {
     /// The plane of a triangle whose pixels ask: it turns the side that they see to the light.
-    fn plane(&self, view: &View, triangles: &Triangles, prim: u32, corners: [Vec3; 3]) -> Option<PixelPlane> {
+    fn plane(&self, view: &View, corners: [Vec3; 3]) -> Option<PixelPlane> {
         let ends = [&self.light, &self.eye];
         let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
         let asks = match fronts {
             [Some(lit), Some(seen)] => lit == seen,
-            _ => self.faces(triangles, prim),
+            _ => exact::same_side(corners, &self.light, &self.eye),
         };
         asks.then_some(plane)
     }
 
     /// Whether the light is on the side of a triangle that the eye sees.
     fn faces(&self, triangles: &Triangles, prim: u32) -> bool {
-        let corners = triangles.corners(prim);
-        let (lit, seen) = (exact::side(corners, &self.light), exact::side(corners, &self.eye));
-        (lit > 0.0 && seen > 0.0) || (lit < 0.0 && seen < 0.0)
+        exact::same_side(triangles.corners(prim), &self.light, &self.eye)
     }
 }
 

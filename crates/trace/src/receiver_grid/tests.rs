@@ -365,5 +365,5 @@ fn sides_are_those_of_the_exact_decision() {
             }
         }
     }
-    assert!(known > 10_000 && known * 100 > all * 90, "{known} of {all}");
+    assert!(known > 10_000 && known * 100 > all * 96, "{known} of {all}");
 }
