@@ -98,6 +98,7 @@ impl<'s> Job<'s> {
     /// The shading of this frame; all contenders shade by the same code, and each does it anew in every frame.
     pub(crate) fn facets(&self) -> Facets<'s> {
         Facets::new(self.view, self.light, self.scene.triangles(), self.level)
+            .with_clusters(&self.scene.clusters)
     }
 }
 

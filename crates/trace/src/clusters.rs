@@ -6,7 +6,7 @@
 //! each is compact and nearly full. Where parts of one cluster move apart its box grows and less can be skipped;
 //! answers do not change.
 //!
-//! Layout: a cluster's triangles and vertices lie together, corners are bytes: 7 bytes a triangle, 4 bytes a vertex
+//! Layout: a cluster's triangles and vertices lie together, corners are bytes: 11 bytes a triangle, 4 bytes a vertex
 //! and cluster. Cost: some 100 ns a triangle to find, once.
 
 use glam::Vec3;
@@ -30,6 +30,8 @@ pub struct Clusters {
     prims: Vec<u32>,
     vertices: Vec<u32>,
     corners: Vec<[u8; 3]>,
+    /// The cluster of each triangle; [`Self::NOWHERE`] for those that are in none.
+    holders: Vec<u32>,
 }
 
 /// One cluster.
@@ -44,6 +46,8 @@ pub(crate) struct Cluster<'a> {
 }
 
 impl Clusters {
+    const NOWHERE: u32 = u32::MAX;
+
     /// Groups these triangles, wherever they will move.
     pub fn new(triangles: &Triangles) -> Self {
         Self::of(triangles, |_| true)
@@ -77,6 +81,13 @@ impl Clusters {
         clusters.add(triangles, &centroids, prims);
         clusters.distinct = clusters.len_with_copies();
         clusters.add(triangles, &centroids, copies);
+        clusters.holders = vec![Self::NOWHERE; triangles.len()];
+        for index in 0..clusters.len_with_copies() {
+            let [first, last] = [clusters.starts[index][0], clusters.starts[index + 1][0]];
+            for &prim in &clusters.prims[first as usize..last as usize] {
+                clusters.holders[prim as usize] = index as u32;
+            }
+        }
         clusters
     }
 
@@ -129,7 +140,7 @@ impl Clusters {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         self.starts.capacity() * 8
-            + (self.prims.capacity() + self.vertices.capacity()) * 4
+            + (self.prims.capacity() + self.vertices.capacity() + self.holders.capacity()) * 4
             + self.corners.capacity() * 3
     }
 
@@ -142,6 +153,13 @@ impl Clusters {
             vertices: &self.vertices[vertices],
             corners: &self.corners[prims],
         }
+    }
+
+    /// The cluster of a triangle.
+    #[inline]
+    pub(crate) fn holder(&self, prim: u32) -> Option<Cluster<'_>> {
+        let index = self.holders[prim as usize];
+        (index != Self::NOWHERE).then(|| self.cluster(index as usize))
     }
 
     /// Adds a cluster's vertices, where they are now, to `points`: sixteen x, y and z each, the last filled up with
@@ -244,6 +262,7 @@ mod tests {
                 assert_eq!(cluster.prims.len(), cluster.corners.len());
                 for (&prim, corners) in cluster.prims.iter().zip(cluster.corners) {
                     seen[prim as usize] += 1;
+                    assert_eq!(clusters.holder(prim).map(|c| c.prims), Some(cluster.prims));
                     let ids = corners.map(|c| cluster.vertices[c as usize]);
                     assert_eq!(ids, triangles.indices[prim as usize]);
                 }

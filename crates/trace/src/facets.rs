@@ -3,11 +3,15 @@
 //! A triangle shows the side that the eye sees. A pixel without a triangle is 0; a surface is 32 where no light
 //! reaches it, 255 where light falls on it upright.
 //!
-//! Layout: 4 bytes a triangle, filled when a pixel first sees the triangle; so the cost is that of what is seen.
+//! Layout: 4 bytes a triangle, filled when a pixel first sees the triangle, or one of its cluster; so the cost is that of
+//! what is seen. A cluster's vertices are read one after the other, for which the memory needs not be waited for
+//! triangle by triangle.
 //! Values of pixels may differ by 1 between instruction sets: nothing is decided by them.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use crate::clusters::{Cluster, Clusters};
+use crate::kernel::facing::{CORNERS, Facing, TRIANGLES, facing};
 use crate::kernel::lambert::{DARK, LambertFrame, LambertTile, lambert};
 use crate::view::{Arrangement, View};
 use crate::{Light, SimdLevel, Triangles};
@@ -19,8 +23,8 @@ pub const BLOCK_LANES: usize = 16;
 #[derive(Debug)]
 pub struct Facets<'a> {
     triangles: Triangles<'a>,
-    light: Light,
-    view: View,
+    clusters: Option<&'a Clusters>,
+    facing: Facing,
     level: SimdLevel,
     frame: LambertFrame,
     /// Per triangle the bits of the light's distance from its plane, or of the cosine for a directional light:
@@ -70,12 +74,27 @@ impl<'a> Facets<'a> {
         let facets = (0..triangles.len()).map(|_| AtomicU32::new(UNASKED)).collect();
         Self {
             triangles,
-            light,
-            view,
+            clusters: None,
+            facing: Facing::new(&view, &light),
             level,
             frame,
             facets,
         }
+    }
+
+    /// The same, found for the triangles of a cluster together. The clusters may have been made when the vertices lay
+    /// elsewhere.
+    ///
+    /// # Panics
+    /// If the clusters are of another number of triangles.
+    pub fn with_clusters(self, clusters: &'a Clusters) -> Self {
+        assert_eq!(
+            clusters.triangle_count(),
+            self.triangles.len(),
+            "of these triangles"
+        );
+        let clusters = Some(clusters);
+        Self { clusters, ..self }
     }
 
     /// Distance of the light from a triangle's plane, positive if it is on the side that the eye sees; for a
@@ -87,26 +106,45 @@ impl<'a> Facets<'a> {
         if bits != UNASKED {
             return f32::from_bits(bits);
         }
-        let facet = self.compute(prim);
-        stored.store(facet.to_bits(), Ordering::Relaxed);
-        facet
+        self.compute(prim);
+        f32::from_bits(stored.load(Ordering::Relaxed))
     }
 
+    /// Finds the facet of a triangle, and of the others of its cluster.
     #[cold]
-    fn compute(&self, prim: u32) -> f32 {
-        let [v0, ..] = self.triangles.corners(prim).map(glam::Vec3::as_dvec3);
-        let Some(normal) = self.triangles.normal(prim).try_normalize() else {
-            return 0.0;
-        };
-        let seen = match self.view.arrangement {
-            Arrangement::Perspective => (self.view.center.as_dvec3() - v0).dot(normal),
-            Arrangement::Parallel { .. } => -self.view.forward.dot(normal),
-        };
-        let facing = match self.light {
-            Light::Point(p) => (p.as_dvec3() - v0).dot(normal),
-            Light::Directional(d) => d.as_dvec3().normalize_or_zero().dot(normal),
-        };
-        (facing * seen.signum()) as f32
+    fn compute(&self, prim: u32) {
+        match self.clusters.and_then(|clusters| clusters.holder(prim)) {
+            Some(Cluster {
+                prims,
+                vertices,
+                corners,
+            }) => {
+                for (prims, corners) in prims.chunks(TRIANGLES).zip(corners.chunks(TRIANGLES)) {
+                    let vertex = |lane: usize, corner: usize| vertices[usize::from(corners[lane][corner])];
+                    self.fill(prims, &vertex);
+                }
+            }
+            None => {
+                let vertices = self.triangles.indices[prim as usize];
+                self.fill(&[prim], &|_, corner| vertices[corner]);
+            }
+        }
+    }
+
+    /// Finds the facets of up to sixteen triangles, of which `vertex` gives the corners.
+    #[inline(always)]
+    fn fill(&self, prims: &[u32], vertex: &impl Fn(usize, usize) -> u32) {
+        let mut corners = [[[0.0; TRIANGLES]; 3]; CORNERS];
+        for lane in 0..prims.len().min(TRIANGLES) {
+            for (number, corner) in corners.iter_mut().enumerate() {
+                let at = self.triangles.vertex(vertex(lane, number));
+                (corner[0][lane], corner[1][lane], corner[2][lane]) = (at.x, at.y, at.z);
+            }
+        }
+        let facets = facing(self.level, &self.facing, &corners);
+        for (&prim, facet) in prims.iter().zip(facets) {
+            self.facets[prim as usize].store(facet.to_bits(), Ordering::Relaxed);
+        }
     }
 
     /// Shades the pixels of a tile whose first pixel is `corner`. `out` has one entry a block, in rows of `stride`.
@@ -174,7 +212,12 @@ mod tests {
         let mesh = Mesh::blob(12);
         let triangles = mesh.triangles();
         let grid = EyeGrid::build(view, triangles, EyeGridOptions::default(), level);
-        let facets = Facets::new(view, light, triangles, level);
+        let clusters = Clusters::of(&triangles, |prim| prim % 5 != 0);
+        let facets = Facets::new(view, light, triangles, level).with_clusters(&clusters);
+        let alone = Facets::new(view, light, triangles, level);
+        for prim in 0..triangles.len() as u32 {
+            assert_eq!(facets.facet(prim).to_bits(), alone.facet(prim).to_bits());
+        }
         let mut hits = TileHits::default();
         let mut bright = 0;
         for index in 0..grid.tile_count() {

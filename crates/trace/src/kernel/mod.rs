@@ -15,6 +15,7 @@ pub(crate) mod casters;
 pub(crate) mod cluster;
 pub(crate) mod cover;
 pub(crate) mod edges;
+pub(crate) mod facing;
 pub(crate) mod lambert;
 pub(crate) mod light_points;
 pub(crate) mod light_tree;
