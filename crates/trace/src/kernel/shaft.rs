@@ -422,13 +422,15 @@ pub(crate) fn overlapped<S: Simd>(simd: S, boxes: &Boxes, batch: &Search) -> u32
     let nearer = f32x16::from_slice(simd, &boxes.nearest) - splat(batch.nearness[0]);
     let farther = f32x16::from_slice(simd, &boxes.farthest) - splat(batch.nearness[1]);
     let lengths = lengths(simd, nearer, farther);
+    let [most, least] = lengths;
     let mut hit = nearer.simd_ge(splat(0.0));
     for (sides, range, [low, high]) in [
         (&boxes.x, batch.x, batch.slopes[0]),
         (&boxes.y, batch.y, batch.slopes[1]),
     ] {
-        let left = lengths[usize::from(low > 0.0)].mul_add(splat(low), splat(range[0]));
-        let right = lengths[usize::from(high < 0.0)].mul_add(splat(high), splat(range[1]));
+        // One of the two products is 0.
+        let left = most.mul_add(splat(low.min(0.0)), least.mul_add(splat(low.max(0.0)), splat(range[0])));
+        let right = most.mul_add(splat(high.max(0.0)), least.mul_add(splat(high.min(0.0)), splat(range[1])));
         hit = hit
             & f32x16::from_slice(simd, &sides[0]).simd_le(right)
             & f32x16::from_slice(simd, &sides[1]).simd_ge(left);
