@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
-use rayward_trace::{Clusters, Topology};
+use rayward_trace::{Clusters, LitScratch, Topology};
 
 use crate::casters::{CasterRules, transparent_triangles};
 use crate::distributed::{self, Shutter};
@@ -30,6 +30,8 @@ pub struct Renderer<'s> {
     environment: Option<Environment>,
     secondary: Arc<dyn SecondaryBuilder>,
     topology: Option<(Vec<[u32; 3]>, Topology, Clusters)>,
+    /// Working memory of the last frame.
+    scratch: LitScratch,
 }
 
 /// A rendered frame.
@@ -59,6 +61,7 @@ impl<'s> Renderer<'s> {
             environment: None,
             secondary: Arc::new(HierarchyBuilder),
             topology: None,
+            scratch: LitScratch::default(),
         }
     }
 
@@ -110,9 +113,9 @@ impl<'s> Renderer<'s> {
         let samples = options.pixel_samples.max(1);
         let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));
         let first = shifted(samples - 1);
-        let secondary = &*self.secondary;
+        let with = (&*self.secondary, std::mem::take(&mut self.scratch));
         let mut structures =
-            FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options, secondary);
+            FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options, with);
         let shapes = solids::solids(geometry);
         let mut solids = FrameSolids::of_frame(&shapes, geometry, first, &plan, options, &mut structures);
         let build = start.elapsed();
@@ -166,7 +169,8 @@ impl<'s> Renderer<'s> {
         self.mark(&mut film, geometry, posed, None, lights, options);
         let mut stats = stats(geometry, options, counts);
         stats.lights = light_stats(&plan, &structures.lights);
-        stats.structures = structures.stats;
+        stats.structures = std::mem::take(&mut structures.stats);
+        self.scratch = std::mem::take(&mut structures.scratch);
         (stats.build, stats.trace) = (build, start.elapsed());
         Ok(RenderedFrame { film, stats })
     }

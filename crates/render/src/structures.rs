@@ -44,6 +44,8 @@ pub struct FrameStructures<'g> {
     pub(crate) measured: Option<Measured<'g>>,
     /// Whether any triangle is masked or blended.
     pub transparent: bool,
+    /// Working memory of lights whose shadows are found for all pixels.
+    pub scratch: LitScratch,
     /// What each structure cost.
     pub stats: Vec<StructureStats>,
 }
@@ -68,7 +70,7 @@ pub enum LightShadows<'g> {
 }
 
 impl<'g> FrameStructures<'g> {
-    /// Builds all structures; each build uses all threads. Where every pixel shows one surface, lights are done one after
+    /// Builds all structures; each build uses all threads. `scratch` is working memory of an earlier frame. Where every pixel shows one surface, lights are done one after
     /// the other, so that memory does not grow with their number but for a bit a pixel.
     pub fn build(
         plan: &FramePlan,
@@ -78,7 +80,7 @@ impl<'g> FrameStructures<'g> {
         rules: &CasterRules<'g>,
         eye_point: Light,
         options: &RenderOptions,
-        builder: &'g dyn SecondaryBuilder,
+        (builder, mut scratch): (&'g dyn SecondaryBuilder, LitScratch),
     ) -> Self {
         let triangles = triangles(geometry);
         let mut stats = Timed::default();
@@ -106,7 +108,6 @@ impl<'g> FrameStructures<'g> {
         let general = any.then(|| general(triangles, options, builder, &mut stats));
         let asked = general.as_deref().filter(|_| shadows);
 
-        let mut scratch = LitScratch::default();
         let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
         for (i, plan) in plan.lights.iter().enumerate() {
             let Some(plan) = plan else {
@@ -163,6 +164,7 @@ impl<'g> FrameStructures<'g> {
             secondary: general.clone().filter(|_| plan.secondary),
             others: general.clone().filter(|_| !geometry.solids.is_empty()),
             shadows: general.filter(|_| shadows),
+            scratch,
             stats: stats.0,
         }
     }
@@ -201,13 +203,13 @@ impl<'g> FrameStructures<'g> {
             return;
         }
         self.visibility = Some(look_around(&self.eye, options));
-        let mut scratch = LitScratch::default();
+        let scratch = &mut self.scratch;
         for (plan, shadows) in plan.lights.iter().zip(&mut self.lights) {
             if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
                 let seen = self.visibility.as_ref();
                 let geometry = (geometry, clusters);
                 let asked = self.shadows.as_deref();
-                let with = (level, &mut scratch);
+                let with = (level, &mut *scratch);
                 *shadows = shadows_of(plan, seen, geometry, rules, eye_point, with, asked);
             }
         }

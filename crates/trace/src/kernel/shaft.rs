@@ -429,8 +429,14 @@ pub(crate) fn overlapped<S: Simd>(simd: S, boxes: &Boxes, batch: &Search) -> u32
         (&boxes.y, batch.y, batch.slopes[1]),
     ] {
         // One of the two products is 0.
-        let left = most.mul_add(splat(low.min(0.0)), least.mul_add(splat(low.max(0.0)), splat(range[0])));
-        let right = most.mul_add(splat(high.max(0.0)), least.mul_add(splat(high.min(0.0)), splat(range[1])));
+        let left = most.mul_add(
+            splat(low.min(0.0)),
+            least.mul_add(splat(low.max(0.0)), splat(range[0])),
+        );
+        let right = most.mul_add(
+            splat(high.max(0.0)),
+            least.mul_add(splat(high.min(0.0)), splat(range[1])),
+        );
         hit = hit
             & f32x16::from_slice(simd, &sides[0]).simd_le(right)
             & f32x16::from_slice(simd, &sides[1]).simd_ge(left);
