@@ -284,12 +284,12 @@ fn test_batch<S: Simd>(
     if work.met.lanes.is_empty() {
         return false;
     }
-    let mut left = active;
+    let (mut left, mut dark) = (active, 0);
     if work.met.lanes.len() <= FEW {
         let [mixed, covered] = over_light(simd, light, batch, work);
-        left &= !covered;
-        if mixed & left == 0 {
-            close_lanes(covered, &mut work.answers[batch]);
+        (left, dark) = (mixed & !covered, covered);
+        if left == 0 {
+            close_lanes(dark, &mut work.answers[batch]);
             return true;
         }
     }
@@ -300,12 +300,12 @@ fn test_batch<S: Simd>(
     for slot in 0..work.bundles.len() {
         test_slot(simd, light, (batch, slot), left, work);
     }
-    close_lanes(active & !left, &mut work.answers[batch]);
+    close_lanes(dark, &mut work.answers[batch]);
     true
 }
 
 /// Triangles up to which a batch is held against each for all of the light, before any sample is made.
-const FEW: usize = 4;
+const FEW: usize = 12;
 
 /// Triangles that may come between the receivers of a batch and the light.
 #[derive(Clone, Debug, Default)]
@@ -364,17 +364,18 @@ fn meet<S: Simd>(
 }
 
 /// Of a batch, those receivers of which the triangles that were met leave samples in question, and those from which one of
-/// them hides all of the light.
+/// them hides all of the light. Of each triangle only the receivers of which it leaves some stay in question.
 #[inline(always)]
-fn over_light<S: Simd>(simd: S, light: &LightLanes, batch: usize, work: &BlockWork) -> [u32; 2] {
+fn over_light<S: Simd>(simd: S, light: &LightLanes, batch: usize, work: &mut BlockWork) -> [u32; 2] {
     let receivers = &work.receivers[batch];
     let size = f32x16::from_slice(simd, &receivers.size);
     let bound = f32x16::from_slice(simd, &receivers.edge_error) * f32x16::splat(simd, 2.0)
         + light.light_box.slacks(simd, size);
     let [mut mixed, mut covered] = [0; 2];
-    for (&found, &lanes) in work.met.found.iter().zip(&work.met.lanes) {
+    for (&found, lanes) in work.met.found.iter().zip(&mut work.met.lanes) {
         let record = work.found.copied(found as usize);
-        let [some, all] = record.over_light(simd, receivers, (light.light_box, bound), lanes);
+        let [some, all] = record.over_light(simd, receivers, (light.light_box, bound), *lanes);
+        *lanes = some;
         mixed |= some;
         covered |= all;
     }

@@ -7,7 +7,7 @@
 //! Cost: some 25 vector instructions, one of them a square root and one a division, for sixteen pixels, and a
 //! look-up of each pixel's facet. Rounding shows in the last of the 8 bits at most.
 
-use fearless_simd::{Simd, dispatch, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, i32x16, prelude::*, u32x16};
 
 use super::tile::{BLOCK, NONE};
 use super::{LANES, SimdLevel, load3, splat3};
@@ -90,9 +90,9 @@ fn lambert_impl<'t, S: Simd>(
         let light = value.max(zero).min(f32x16::splat(simd, 1.0));
         let light = light * f32x16::splat(simd, 255.0 - DARK) + f32x16::splat(simd, DARK + 0.5);
         let shown = seen.select(light, f32x16::splat(simd, f32::from(BACKGROUND)));
-        let shown: [u32; LANES] = shown.to_int::<u32x16<S>>().into();
-        for (out, value) in out.iter_mut().zip(shown) {
-            *out = value as u8;
+        let shown: [i32; LANES] = shown.to_int::<i32x16<S>>().into();
+        for lane in 0..LANES {
+            out[lane] = shown[lane] as u8;
         }
     }
 }
@@ -174,11 +174,12 @@ fn facets_of(prims: &[u32; LANES], uniform: bool, facet: &impl Fn(u32) -> f32) -
     }
     let mut facets = [0.0; LANES];
     let mut last = (NONE, 0.0);
-    for (facets, &prim) in facets.iter_mut().zip(prims) {
+    for lane in 0..LANES {
+        let prim = prims[lane];
         if prim != last.0 {
             last = (prim, if prim == NONE { 0.0 } else { facet(prim) });
         }
-        *facets = last.1;
+        facets[lane] = last.1;
     }
     facets
 }

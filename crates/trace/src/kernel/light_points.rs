@@ -3,7 +3,7 @@
 //! Cost: some 90 vector operations a sample, for all sixteen. Only multiplications, additions, divisions and roots,
 //! which are rounded alike at every level; nothing here may be fused.
 
-use fearless_simd::{Simd, f32x16, prelude::*, u32x16};
+use fearless_simd::{Simd, f32x16, i32x16, prelude::*, u32x16};
 
 use super::lines::each3;
 use super::{LANES, load3};
@@ -64,9 +64,9 @@ pub(crate) fn light_points<S: Simd>(
     for k in 0..samples.count() {
         let x = unit_float(simd, scrambled(simd, k, seeds[0]));
         let y = unit_float(simd, scrambled(simd, second(k), seeds[1]));
-        let column: u32x16<S> = (x * two_to(column_bits)).to_int();
-        let row: u32x16<S> = (y * two_to(row_bits)).to_int();
-        let slots: [u32; LANES] = (row * u32x16::splat(simd, 1 << column_bits) + column).into();
+        let column: i32x16<S> = (x * two_to(column_bits)).to_int();
+        let row: i32x16<S> = (y * two_to(row_bits)).to_int();
+        let slots: [i32; LANES] = ((row << column_bits) + column).into();
         let (x, y) = (x * splat(2.0) - splat(1.0), y * splat(2.0) - splat(1.0));
         let [x, y] = match light.shape {
             Shape::Rectangle => [x, y],
@@ -123,7 +123,8 @@ fn scrambled<S: Simd>(simd: S, x: u32, seed: u32x16<S>) -> u32x16<S> {
 
 #[inline(always)]
 fn unit_float<S: Simd>(simd: S, bits: u32x16<S>) -> f32x16<S> {
-    (bits >> 8).to_float::<f32x16<S>>() * f32x16::splat(simd, 1.0 / (1 << 24) as f32)
+    // Below 2^24, so that the conversion of signed numbers does, which more machines have.
+    (bits >> 8).bitcast::<i32x16<S>>().to_float::<f32x16<S>>() * f32x16::splat(simd, 1.0 / (1 << 24) as f32)
 }
 
 #[inline(always)]

@@ -6,7 +6,7 @@
 //!
 //! Cost: some 30 vector instructions for sixteen pixels and each of their triangles, and 100 to project them.
 
-use fearless_simd::{Simd, dispatch, f32x16, f64x8, mask32x16, mask64x8, prelude::*, u32x16};
+use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, mask32x16, mask64x8, prelude::*, u32x16};
 use glam::{DVec3, Vec3, Vec3Swizzles};
 
 use super::project::project_half;
@@ -454,11 +454,11 @@ fn within<S: Simd>(simd: S, v: f32x16<S>, size: u32) -> mask32x16<S> {
 
 /// Column or row of light tiles.
 #[inline(always)]
-fn tile_index<S: Simd>(simd: S, v: f32x16<S>, tiles: u32) -> u32x16<S> {
+fn tile_index<S: Simd>(simd: S, v: f32x16<S>, tiles: u32) -> i32x16<S> {
     let scaled = v * f32x16::splat(simd, 1.0 / LIGHT_TILE as f32);
     let last = f32x16::splat(simd, tiles as f32 - 1.0);
     let kept = scaled.max(f32x16::splat(simd, 0.0)).min(last);
-    kept.to_int::<u32x16<S>>()
+    kept.to_int::<i32x16<S>>()
 }
 
 /// How far from each other the receivers of an entry may lie on either axis, in units of the face's raster: a block that
@@ -486,7 +486,7 @@ fn sort_block<S: Simd>(
     let tiles = [view.width, view.height].map(|size| size / LIGHT_TILE);
     let column = tile_index(simd, x, tiles[0]);
     let row = tile_index(simd, y, tiles[1]);
-    let tile = row * tiles[0] + column;
+    let tile = (row * tiles[0] as i32 + column).bitcast::<u32x16<S>>();
     let position = points.len() as u32;
     let side = f32x16::splat(simd, LIGHT_TILE as f32);
     let x = x - column.to_float::<f32x16<S>>() * side;
