@@ -169,10 +169,12 @@ impl<'a> Facets<'a> {
 /// Takes from a shaded block what does not reach it of the light: `lit` of `samples` samples do.
 #[inline]
 pub fn darken(block: &mut [u8; BLOCK_LANES], lit: &[u8; BLOCK_LANES], samples: u8) {
-    let samples = u16::from(samples.max(1));
-    for (value, &lit) in block.iter_mut().zip(lit) {
-        let light = u16::from(value.saturating_sub(DARK as u8)) * u16::from(lit) / samples;
-        *value = (*value).min(DARK as u8) + light as u8;
+    // Of numbers below 2^16 and divisors below 2^8 the product's upper word is the quotient.
+    let reciprocal = (1 << 32) / u64::from(samples.max(1)) + 1;
+    for lane in 0..BLOCK_LANES {
+        let value = block[lane];
+        let light = u64::from(value.saturating_sub(DARK as u8)) * u64::from(lit[lane]);
+        block[lane] = value.min(DARK as u8) + ((light * reciprocal) >> 32) as u8;
     }
 }
 
@@ -296,6 +298,20 @@ mod tests {
             for view in [perspective, parallel] {
                 check(view, Light::Point(Vec3::new(2.0, 3.0, 2.5)), level);
                 check(view, Light::Directional(Vec3::new(0.5, 1.0, 1.5)), level);
+            }
+        }
+    }
+
+    #[test]
+    fn shares_of_light_are_rounded_down() {
+        for samples in 1..=255u8 {
+            for lit in 0..=samples {
+                let first = (lit as usize * 7) % 200;
+                let values: [u8; BLOCK_LANES] = std::array::from_fn(|lane| 32 + (first + lane) as u8);
+                let mut block = values;
+                darken(&mut block, &[lit; BLOCK_LANES], samples);
+                let share = |value: u8| 32 + u32::from(value - 32) * u32::from(lit) / u32::from(samples);
+                assert_eq!(block.map(u32::from), values.map(share), "{lit} of {samples}");
             }
         }
     }
