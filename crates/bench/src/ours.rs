@@ -228,10 +228,19 @@ impl Rayward {
             let memory = (&mut work.scratch, &mut work.lit);
             tree.visible_pixels(&seen, &asks, &set_of, &job.samples, memory);
             let mut asking = 0;
+            let samples = job.samples.count();
             for (i, block) in out.blocks.iter_mut().enumerate() {
-                // The share of all samples as so many of the usual number.
-                let share = |seen: u16| (u32::from(seen) * SOFT_SAMPLES / job.samples.count()) as u8;
-                darken(block, &work.lit.counts(i).map(share), SOFT_SAMPLES as u8);
+                let seen = work.lit.counts(i);
+                let mut lit = [0; BLOCK_LANES];
+                for lane in 0..BLOCK_LANES {
+                    // The share of all samples as so many of the usual number.
+                    lit[lane] = if samples == SOFT_SAMPLES {
+                        seen[lane] as u8
+                    } else {
+                        (u32::from(seen[lane]) * SOFT_SAMPLES / samples) as u8
+                    };
+                }
+                darken(block, &lit, SOFT_SAMPLES as u8);
                 asking += u64::from(work.lit.asked(i).count_ones());
             }
             asking * u64::from(job.samples.count())

@@ -83,8 +83,8 @@ pub(crate) fn light_points<S: Simd>(
             ((rounded - center[axis]) * splat(unit)).store_slice(&mut offsets[axis]);
         }
         let ([x, y, z], all) = (&offsets, &mut out.offsets[..]);
-        for (lane, slot) in slots.into_iter().enumerate() {
-            let slot = slot as usize;
+        for lane in 0..LANES {
+            let slot = slots[lane] as usize;
             let [to_x, to_y, to_z] = &mut all[slot];
             (to_x[lane], to_y[lane], to_z[lane]) = (x[lane], y[lane], z[lane]);
             out.lanes[slot] |= 1 << lane;
