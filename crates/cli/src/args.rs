@@ -420,7 +420,7 @@ pub(crate) struct RunArgs {
     /// Instruction set: one that `rayward doctor` lists; the best unless given. The picture does not depend on it
     #[arg(long, value_name = "LEVEL")]
     pub(crate) simd: Option<String>,
-    /// Reflections, refractions and hard shadows on a GPU; auto takes the CPU where there is none but software. The
+    /// Eye rays, shadows, reflections and refractions on a GPU; auto takes the CPU where there is none but software. The
     /// picture does not depend on it
     #[arg(long, value_name = "on|auto|off", default_value = "off", default_missing_value = "on", num_args = 0..=1,
         require_equals = true, conflicts_with_all = ["aperture", "shutter", "reference", "secondary"])]

@@ -6,11 +6,15 @@ use std::sync::{Mutex, PoisonError};
 use bytemuck::Pod;
 use wgpu::{Buffer, BufferUsages};
 
-use crate::ldc::shaders::Program;
+use crate::ldc::layout::Scan;
+use crate::ldc::shaders::{Program, SCAN};
 use crate::{Error, Gpu, Result};
 
 /// Most workgroups along one side of a dispatch.
 const SIDE: u64 = 65_535;
+
+/// Numbers that a workgroup of `scan.wgsl` sums up.
+const BLOCK: u64 = 1024;
 
 /// Compiled entry points, by program and name.
 #[derive(Debug, Default)]
@@ -146,6 +150,28 @@ impl Gpu {
             }
             self.queue.submit([encoder.finish()]);
         })
+    }
+
+    /// Replaces numbers by the sums of those before each; returns the largest of them.
+    pub(crate) fn scan(&self, values: &Buffer, count: u64) -> Result<u32> {
+        let blocks = count.div_ceil(BLOCK);
+        let constants = Scan {
+            count: count as u32,
+            blocks: blocks as u32,
+            pad: [0; 2],
+        };
+        let scan = self.uniform("prefix sums", &constants)?;
+        let sums = self.storage("prefix sums", 4 * blocks)?;
+        let most = self.storage("prefix sums", 4)?;
+        let run = |entry, bindings: &[(u32, &Buffer)], groups| self.dispatch(&SCAN, entry, bindings, groups);
+        run(
+            "reduce",
+            &[(0, &scan), (1, values), (2, &sums), (3, &most)],
+            blocks,
+        )?;
+        run("blocks", &[(0, &scan), (2, &sums)], 1)?;
+        run("spread", &[(0, &scan), (1, values), (2, &sums)], blocks)?;
+        Ok(self.read(&most, 0, 1)?[0])
     }
 
     /// Copies the first bytes of one buffer into another.

@@ -1,4 +1,4 @@
-//! The layered depth cube (VMV07) on any GPU that wgpu reaches: Vulkan, Metal, DirectX 12.
+//! The layered depth cube (VMV07) and perspective grids (HM08) on any GPU that wgpu reaches: Vulkan, Metal, DirectX 12.
 //!
 //! | file | job |
 //! |---|---|
@@ -7,7 +7,8 @@
 //! | `ldc/build.rs`, `raster.wgsl` and others | triangles to a cube |
 //! | `ldc/trace.rs`, `walk.wgsl` and others | rays through a cube |
 //! | `bvh/`, `bvh.wgsl` | rays through a hierarchy, for comparison |
-//! | `batch.rs` | arrays of rays to answers, for both |
+//! | `grid/`, `grid.wgsl`, `look.wgsl` | rays of a vantage through its perspective grid (HM08) |
+//! | `batch.rs` | arrays of rays to answers, for all of these |
 //! | `secondary.rs` | the cube in frames of `rayward` |
 //!
 //! [`trace::ldc`] is the reference of every stage. Rays are arrays in, answers arrays out. Hits by samples are those
@@ -38,6 +39,7 @@ mod bvh;
 mod commands;
 mod device;
 mod error;
+mod grid;
 mod ldc;
 mod secondary;
 #[cfg(test)]
@@ -48,5 +50,6 @@ pub use rayward_trace as trace;
 pub use bvh::GpuBvh;
 pub use device::{AdapterSummary, Gpu, adapters};
 pub use error::{Error, Result};
+pub use grid::{GpuGrid, GridGeometry};
 pub use ldc::{Cube, CubeOptions, TraceStats};
-pub use secondary::GpuSecondary;
+pub use secondary::{GpuSecondary, Through};

@@ -108,7 +108,7 @@ impl<'s> Renderer<'s> {
         let environment = self.environment.as_ref();
         let plan = FramePlan::new(geometry, lights, options)
             .with_secondary(self.scene, geometry, environment.is_some(), options)
-            .with_shadow_structures(geometry, &rules, self.secondary.takes_shadows(), options);
+            .with_shadow_structures(geometry, &rules, self.secondary.takes_arrays(), options);
         let eye = camera.vantage();
         let samples = options.pixel_samples.max(1);
         let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));

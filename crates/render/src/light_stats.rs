@@ -76,6 +76,7 @@ pub(crate) fn light_stats(plan: &FramePlan, shadows: &[LightShadows]) -> Vec<Lig
                 LightShadows::Pixels(_) => "receivers",
                 LightShadows::Area(_) => "area tree",
                 LightShadows::AreaGrid(_) => "area grid",
+                LightShadows::Asked => "cube",
                 LightShadows::Reference => "reference",
             },
             costs: plan.as_ref().and_then(|plan| plan.costs),

@@ -3,11 +3,11 @@
 
 use std::fmt::Debug;
 use std::ops::ControlFlow;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rayward_trace::exact::ExactHit;
-use rayward_trace::ldc::StepCounts;
-use rayward_trace::{Bvh, Counters, Ldc, LdcOptions, Light, Receiver, SurfaceRay, Triangles, ViewRay};
+use rayward_trace::ldc::{StepCounts, StillCube};
+use rayward_trace::{Bvh, Counters, Ldc, LdcOptions, Light, Receiver, SurfaceRay, Triangles, View, ViewRay};
 
 use crate::PixelCost;
 
@@ -34,9 +34,19 @@ pub trait SecondaryTracer: Debug + Send + Sync {
         PixelCost::default()
     }
 
-    /// Whether any triangle lies between each receiver and the light, from structures that would rather have arrays
-    /// than single rays; `None` from others.
+    /// The first triangle that each pixel's ray meets, from structures that would rather have arrays than single rays;
+    /// `None` from others, and if they fail.
+    fn seen(&self, _view: &View, _pixels: &[[u32; 2]]) -> Option<Vec<Option<u32>>> {
+        None
+    }
+
+    /// Whether any triangle lies between each receiver and the light, of such structures.
     fn shadowed(&self, _receivers: &[Receiver], _light: &Light) -> Option<Vec<bool>> {
+        None
+    }
+
+    /// The same with a light for each receiver.
+    fn hidden(&self, _queries: &[(Receiver, Light)]) -> Option<Vec<bool>> {
         None
     }
 }
@@ -46,8 +56,8 @@ pub trait SecondaryBuilder: Debug + Send + Sync {
     /// Builds over all triangles of a frame.
     fn build<'g>(&'g self, triangles: Triangles<'g>) -> BuiltTracer<'g>;
 
-    /// Whether hard shadows of all pixels are asked of it, too, by [`SecondaryTracer::shadowed`].
-    fn takes_shadows(&self) -> bool {
+    /// Whether what all pixels see and their shadows are asked of it, too, as arrays.
+    fn takes_arrays(&self) -> bool {
         false
     }
 }
@@ -84,18 +94,33 @@ impl SecondaryBuilder for HierarchyBuilder {
     }
 }
 
-/// Builds the layered depth cube (VMV07), its samples naming every triangle over a texel: exact.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CubeBuilder(pub LdcOptions);
+/// Builds the layered depth cube (VMV07), its samples naming every triangle over a texel: exact. What stands still over
+/// the frames it is asked for keeps its cube.
+#[derive(Debug, Default)]
+pub struct CubeBuilder(Mutex<StillCube>);
+
+impl CubeBuilder {
+    /// Builds cubes with these parameters.
+    pub fn new(options: LdcOptions) -> Self {
+        Self(Mutex::new(StillCube::new(options)))
+    }
+}
 
 impl SecondaryBuilder for CubeBuilder {
     fn build<'g>(&'g self, triangles: Triangles<'g>) -> BuiltTracer<'g> {
-        let cube = Ldc::build(triangles, &self.0);
-        let [width, height, depth] = cube.size().map(|side| side as usize);
+        let cube = self
+            .0
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .build(triangles);
         BuiltTracer {
-            name: "layered depth cube for other rays",
+            name: if cube.rebuilt() < cube.stats().triangles {
+                "layered depth cube for other rays, what stands still kept"
+            } else {
+                "layered depth cube for other rays"
+            },
             bytes: cube.bytes(),
-            cells: width * height + height * depth + depth * width,
+            cells: cube.texels(),
             references: cube.samples().iter().sum(),
             tracer: Arc::new(cube),
         }

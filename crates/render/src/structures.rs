@@ -38,8 +38,8 @@ pub struct FrameStructures<'g> {
     pub secondary: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// The same, for the light of solids; `None` without such.
     pub others: Option<Arc<dyn SecondaryTracer + 'g>>,
-    /// The same, if hard shadows of all pixels are asked of it.
-    pub shadows: Option<Arc<dyn SecondaryTracer + 'g>>,
+    /// The same, if what all pixels see and their shadows are asked of it.
+    pub arrays: Option<Arc<dyn SecondaryTracer + 'g>>,
     /// What is asked of again, to tell what rays cost.
     pub(crate) measured: Option<Measured<'g>>,
     /// Whether any triangle is masked or blended.
@@ -65,6 +65,8 @@ pub enum LightShadows<'g> {
     Area(AreaLightTree<'g>),
     /// The same through a 3-D grid, as in the paper.
     AreaGrid(Box<AreaLightGrid<'g>>),
+    /// By samples of its area, asked of the structure that takes arrays.
+    Asked,
     /// By every triangle, for references.
     Reference,
 }
@@ -84,29 +86,21 @@ impl<'g> FrameStructures<'g> {
     ) -> Self {
         let triangles = triangles(geometry);
         let mut stats = Timed::default();
-        let eye = stats.build(
-            "eye grid",
-            || eye_grid(plan, view, geometry, clusters, rules, options.level),
-            |eye| [eye.bytes(), eye.tile_count() as usize, eye.reference_count()],
-        );
-
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
         let hard = |plan: &Option<LightPlan>| plan.as_ref().is_some_and(LightPlan::at_once);
         let slowly = rules.any_transparent() || options.paper || options.reference;
         let at_once = plan.lights.iter().any(hard) && !slowly;
-        let visibility = at_once.then(|| {
-            let trace = || look_around(&eye, options);
-            stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
-        });
-
         let soft = plan.lights.iter().flatten().any(|plan| plan.area.is_some());
         let through = (soft || options.reference) && rules.any_transparent();
         // It knows of no triangles that cast by one side alone.
-        let shadows = at_once && builder.takes_shadows() && options.casters() != CasterPolicy::Back;
+        let arrays = builder.takes_arrays() && !slowly && options.casters() != CasterPolicy::Back;
         let costs = options.layers.cost;
-        let any = through || plan.secondary || shadows || costs || !geometry.solids.is_empty();
+        let any = through || plan.secondary || arrays || costs || !geometry.solids.is_empty();
         let general = any.then(|| general(triangles, options, builder, &mut stats));
-        let asked = general.as_deref().filter(|_| shadows);
+        let asked = general.as_deref().filter(|_| arrays);
+
+        let grid = || eye_grid(plan, view, geometry, clusters, rules, options.level);
+        let (eye, visibility) = look_first(asked, plan, view, at_once, grid, options, &mut stats);
 
         let (mut lights, mut light_veils) = (Vec::new(), Vec::new());
         for (i, plan) in plan.lights.iter().enumerate() {
@@ -163,7 +157,7 @@ impl<'g> FrameStructures<'g> {
             transparent: rules.any_transparent(),
             secondary: general.clone().filter(|_| plan.secondary),
             others: general.clone().filter(|_| !geometry.solids.is_empty()),
-            shadows: general.filter(|_| shadows),
+            arrays: general.filter(|_| arrays),
             scratch,
             stats: stats.0,
         }
@@ -194,7 +188,11 @@ impl<'g> FrameStructures<'g> {
         options: &RenderOptions,
     ) {
         let level = options.level;
-        self.eye = eye_grid(plan, view, geometry, clusters, rules, level);
+        let grid = || eye_grid(plan, view, geometry, clusters, rules, level);
+        let (asked, at_once) = (self.arrays.as_deref(), self.visibility.is_some());
+        let mut untold = Timed::default();
+        let seen = look_first(asked, plan, view, at_once, grid, options, &mut untold);
+        (self.eye, self.visibility) = seen;
         if self.veils.is_some() {
             let is_veil = |prim| rules.is_transparent(prim);
             self.veils = Some(EyeVeils::build(view, triangles(geometry), is_veil, level));
@@ -202,13 +200,12 @@ impl<'g> FrameStructures<'g> {
         if self.visibility.is_none() {
             return;
         }
-        self.visibility = Some(look_around(&self.eye, options));
         let scratch = &mut self.scratch;
         for (plan, shadows) in plan.lights.iter().zip(&mut self.lights) {
             if let (Some(plan), LightShadows::Pixels(_)) = (plan, &shadows) {
                 let seen = self.visibility.as_ref();
                 let geometry = (geometry, clusters);
-                let asked = self.shadows.as_deref();
+                let asked = self.arrays.as_deref();
                 let with = (level, &mut *scratch);
                 *shadows = shadows_of(plan, seen, geometry, rules, eye_point, with, asked);
             }
@@ -289,6 +286,48 @@ fn look_around(eye: &EyeGrid, options: &RenderOptions) -> Visibility {
     Visibility::trace_some(eye, &|tile| options.renders(tile), &|_, _| ())
 }
 
+/// The camera's grid, and what all pixels see: if a structure that takes arrays tells, or else if it is wanted at once.
+fn look_first<'g>(
+    asked: Option<&dyn SecondaryTracer>,
+    plan: &FramePlan,
+    view: View,
+    at_once: bool,
+    grid: impl FnOnce() -> EyeGrid<'g>,
+    options: &RenderOptions,
+    stats: &mut Timed,
+) -> (EyeGrid<'g>, Option<Visibility>) {
+    if let Some(tracer) = asked {
+        let ask = || ask_around(tracer, plan, view, options);
+        let size = |seen: &Option<(_, Visibility)>| [seen.as_ref().map_or(0, |s| s.1.bytes()), 0, 0];
+        if let Some((eye, visibility)) = stats.build("visibility", ask, size) {
+            return (eye, Some(visibility));
+        }
+    }
+    let eye = stats.build("eye grid", grid, |eye| {
+        [eye.bytes(), eye.tile_count() as usize, eye.reference_count()]
+    });
+    let visibility = at_once.then(|| {
+        let trace = || look_around(&eye, options);
+        stats.build("visibility", trace, |visibility| [visibility.bytes(), 0, 0])
+    });
+    (eye, visibility)
+}
+
+/// What the camera sees by a structure that takes arrays, and a grid of no triangles that has the tiles; `None` if it does
+/// not answer.
+fn ask_around<'g>(
+    tracer: &dyn SecondaryTracer,
+    plan: &FramePlan,
+    view: View,
+    options: &RenderOptions,
+) -> Option<(EyeGrid<'g>, Visibility)> {
+    let nothing = Triangles::new(&[], &[], &[], &[]);
+    let eye = EyeGrid::build_of(view, nothing, |_| true, plan.eye, options.level);
+    let seen = |pixels: &[[u32; 2]]| tracer.seen(&view, pixels);
+    let visibility = Visibility::asked(&eye, &|tile| options.renders(tile), seen)?;
+    Some((eye, visibility))
+}
+
 /// Builds the structure for all other rays.
 fn general<'g>(
     triangles: Triangles<'g>,
@@ -358,6 +397,9 @@ fn shadows_of<'g>(
 ) -> LightShadows<'g> {
     let triangles = triangles(geometry);
     if let Some(area) = plan.area {
+        if asked.is_some() {
+            return LightShadows::Asked;
+        }
         let rule = rules.for_area(geometry, &area);
         if let Some(cells) = &plan.soft_grid {
             let grid = AreaLightGrid::build(area, triangles, &rule, cells);
@@ -401,7 +443,7 @@ fn shadows_of<'g>(
 impl LightShadows<'_> {
     fn stats(&self, name: &str, start: Instant) -> StructureStats {
         let (what, bytes, cells, references) = match self {
-            Self::Nothing | Self::Reference => ("no shadows", 0, 0, 0),
+            Self::Nothing | Self::Asked | Self::Reference => ("no shadows", 0, 0, 0),
             Self::Grid(grid) => (
                 "light grid",
                 grid.bytes(),

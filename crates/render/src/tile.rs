@@ -422,7 +422,8 @@ impl TileShader<'_> {
             LightShadows::Nothing
             | LightShadows::Pixels(_)
             | LightShadows::Area(_)
-            | LightShadows::AreaGrid(_) => {
+            | LightShadows::AreaGrid(_)
+            | LightShadows::Asked => {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
             }

@@ -85,6 +85,7 @@ pub use light_grid::{
     ShadowScratch,
 };
 pub use light_tree::{PointLightTree, TreeSteps};
+pub use light_views::views_of_light;
 pub use moving::{MovingAt, MovingGrids, MovingTriangles, Vertices};
 pub use perspective_grids::PerspectiveGrids;
 pub use queries::Candidates;

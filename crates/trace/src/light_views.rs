@@ -92,6 +92,13 @@ pub(crate) fn views(
     Some(LightFaces { cube, ..faces })
 }
 
+/// The views of a light onto these triangles, each on a raster of one unit that shows all triangles before it: one, or up to
+/// six where the light is among them. What one shows may be shown by its neighbours, too. `None` if the geometry is too
+/// large or too small to be projected.
+pub fn views_of_light(light: &Light, triangles: &Triangles) -> Option<Vec<View>> {
+    views(light, triangles, None, None).map(|faces| faces.views)
+}
+
 /// A perspective view on a raster of one unit.
 fn unit_view(position: Vec3, axes: [DVec3; 3], tan: f64) -> View {
     View::perspective(position, axes, [tan; 2], [1; 2])

@@ -72,6 +72,38 @@ impl Visibility {
         }
     }
 
+    /// As [`Self::trace_some`] by something that answers all pixels at once: `seen` is given those of all tiles that are
+    /// wanted and tells the closest triangle of each. `None` if it does not answer.
+    pub fn asked(
+        grid: &EyeGrid,
+        wanted: &dyn Fn(&Tile) -> bool,
+        seen: impl FnOnce(&[[u32; 2]]) -> Option<Vec<Option<u32>>>,
+    ) -> Option<Self> {
+        let tiles = (0..grid.tile_count()).map(|index| grid.tile(index));
+        let mut tiles: Vec<VisibleTile> = tiles.map(VisibleTile::blind).collect();
+        let mut places = Vec::new();
+        let mut pixels = Vec::new();
+        for (index, tile) in tiles.iter().enumerate().filter(|(_, tile)| wanted(&tile.tile)) {
+            let own = (0..tile.tile.height).flat_map(|y| (0..tile.tile.width).map(move |x| [x, y]));
+            for [x, y] in own {
+                places.push((index, place(tile.stride, x, y)));
+                pixels.push([tile.tile.x + x, tile.tile.y + y]);
+            }
+        }
+        let answers = seen(&pixels)?;
+        let mut count = 0;
+        for ((index, (block, lane)), prim) in places.into_iter().zip(answers) {
+            count += u64::from(prim.is_some());
+            tiles[index].prims[block][lane] = prim.unwrap_or(NONE);
+        }
+        Some(Self {
+            view: *grid.view(),
+            tiles,
+            exact_pixels: 0,
+            seen: count,
+        })
+    }
+
     /// The view it was seen in.
     pub fn view(&self) -> &View {
         &self.view

@@ -14,7 +14,7 @@ use rayward_trace::ldc::{CubeFrame, Hierarchy};
 use rayward_trace::{Accel, Bvh, BvhNode, Hit, Light, Ray, Receiver, SurfaceRay, Triangles};
 use wgpu::Buffer;
 
-use crate::batch::{SurfaceHit, Traced};
+use crate::batch::{Structure, SurfaceHit, Traced};
 use crate::ldc::build::{layout, upload, usable};
 use crate::ldc::shaders::TREE;
 use crate::{CubeOptions, Error, Gpu, Result, TraceStats};
@@ -158,14 +158,10 @@ impl<'a> GpuBvh<'a> {
     }
 
     fn traced(&self) -> Traced<'_> {
-        Traced {
-            gpu: self.gpu,
-            triangles: self.triangles,
+        let tree = Structure {
             frame: self.frame,
             empty: self.empty,
             complete: true,
-            program: &TREE,
-            entry: "trace_tree",
             bindings: vec![
                 (0, &self.layout),
                 (1, &self.positions),
@@ -173,6 +169,14 @@ impl<'a> GpuBvh<'a> {
                 (3, &self.nodes),
                 (4, &self.leaves),
             ],
+            placing: None,
+        };
+        Traced {
+            gpu: self.gpu,
+            triangles: self.triangles,
+            program: &TREE,
+            entry: "trace_tree",
+            structures: vec![tree],
         }
     }
 }

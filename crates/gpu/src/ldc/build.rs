@@ -2,14 +2,16 @@
 //!
 //! Vertices are turned into texel coordinates in f64 here and rounded once; all that shaders do is in those.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use rayward_trace::ldc::{Coverage, CubeFrame, Hierarchy, LdcBuild, TILE};
 use rayward_trace::{BuildStats, Triangles};
 use wgpu::Buffer;
 
-use super::layout::{Frame, Raise, Scan};
-use super::shaders::{LEVELS, RASTER, SCAN, SORT};
-use super::{Buffers, Cube, CubeOptions};
+use super::layout::{Frame, Raise};
+use super::shaders::{LEVELS, RASTER, SORT};
+use super::{Buffers, Cube, CubeOptions, Stacks};
 use crate::{Error, Gpu, Result};
 
 const LEAST_RESOLUTION: u32 = 16;
@@ -20,10 +22,8 @@ const MAX_ROWS: f64 = (1u64 << 28) as f64;
 const SAMPLE: u64 = 12;
 /// Threads of a workgroup of the shaders dispatched by [`groups`].
 const GROUP: u64 = 64;
-/// Numbers that a workgroup of `scan.wgsl` sums up.
-const BLOCK: u64 = 1024;
-
-fn groups(threads: u64) -> u64 {
+/// Workgroups for so many threads.
+pub(crate) fn groups(threads: u64) -> u64 {
     threads.div_ceil(GROUP)
 }
 
@@ -32,18 +32,36 @@ impl<'a> Cube<'a> {
     /// threads.
     pub fn build(gpu: &'a Gpu, triangles: Triangles<'a>, options: &CubeOptions) -> Result<Self> {
         let (prims, stats) = usable(&triangles);
+        Ok(Self {
+            gpu,
+            triangles,
+            stacks: vec![Arc::new(Stacks::build(gpu, &triangles, &prims, options)?)],
+            rebuilt: stats.triangles,
+            stats,
+        })
+    }
+}
+
+impl Stacks {
+    /// Builds over these triangles.
+    pub(crate) fn build(
+        gpu: &Gpu,
+        triangles: &Triangles,
+        prims: &[u32],
+        options: &CubeOptions,
+    ) -> Result<Self> {
         let most = options.max_samples.min(gpu.largest_binding() / SAMPLE);
         let mut resolution = options.resolution.clamp(LEAST_RESOLUTION, MAX_RESOLUTION);
         loop {
             let last = resolution <= LEAST_RESOLUTION;
-            let frame = CubeFrame::around(&triangles, &prims, resolution);
-            let size = Size::estimate(&frame, &triangles, &prims);
+            let frame = CubeFrame::around(triangles, prims, resolution);
+            let size = Size::estimate(&frame, triangles, prims);
             // Estimates are rather high; the count on the device decides.
             if last || (size.rows <= MAX_ROWS && size.samples <= 4.0 * most as f64) {
-                let stage = Stage::new(gpu, &frame, triangles, options, &prims, size)?;
+                let stage = Stage::new(gpu, &frame, triangles, options, prims, size)?;
                 let (samples, layers) = stage.count()?;
                 if samples <= most {
-                    return stage.finish(frame, stats, options, samples, layers);
+                    return stage.finish(frame, options, samples, layers);
                 }
                 if last {
                     return Err(Error::Limits {
@@ -158,7 +176,7 @@ pub(crate) fn upload(
 /// A build at one resolution, under way.
 struct Stage<'a> {
     gpu: &'a Gpu,
-    triangles: Triangles<'a>,
+    triangles: u64,
     layout: Frame,
     cells: u64,
     rows: u64,
@@ -173,7 +191,7 @@ impl<'a> Stage<'a> {
     fn new(
         gpu: &'a Gpu,
         frame: &CubeFrame,
-        triangles: Triangles<'a>,
+        triangles: &Triangles,
         options: &CubeOptions,
         prims: &[u32],
         size: Size,
@@ -186,12 +204,12 @@ impl<'a> Stage<'a> {
                 limit: MAX_ROWS as u64,
             });
         }
-        let [positions, indices] = upload(gpu, frame, &triangles, prims)?;
+        let [positions, indices] = upload(gpu, frame, triangles, prims)?;
         let (layout, cells) = layout(frame, triangles.len(), options);
         let texels = u64::from(layout.first_texel[3]);
         Ok(Self {
             gpu,
-            triangles,
+            triangles: triangles.len() as u64,
             layout,
             cells,
             rows: size.rows as u64,
@@ -207,32 +225,9 @@ impl<'a> Stage<'a> {
         u64::from(self.layout.first_texel[3])
     }
 
-    /// Replaces numbers by the sums of those before each; returns the largest of them.
-    fn scan(&self, values: &Buffer, count: u64) -> Result<u32> {
-        let blocks = count.div_ceil(BLOCK);
-        let constants = Scan {
-            count: count as u32,
-            blocks: blocks as u32,
-            pad: [0; 2],
-        };
-        let scan = self.gpu.uniform("prefix sums", &constants)?;
-        let sums = self.gpu.storage("prefix sums", 4 * blocks)?;
-        let most = self.gpu.storage("prefix sums", 4)?;
-        let run =
-            |entry, bindings: &[(u32, &Buffer)], groups| self.gpu.dispatch(&SCAN, entry, bindings, groups);
-        run(
-            "reduce",
-            &[(0, &scan), (1, values), (2, &sums), (3, &most)],
-            blocks,
-        )?;
-        run("blocks", &[(0, &scan), (2, &sums)], 1)?;
-        run("spread", &[(0, &scan), (1, values), (2, &sums)], blocks)?;
-        Ok(self.gpu.read(&most, 0, 1)?[0])
-    }
-
     /// Counts samples; returns how many there are, and how many in the fullest texel.
     fn count(&self) -> Result<(u64, u32)> {
-        let triangles = self.triangles.len() as u64;
+        let triangles = self.triangles;
         let mut bindings = vec![
             (0, &self.frame),
             (1, &self.positions),
@@ -240,23 +235,16 @@ impl<'a> Stage<'a> {
             (3, &self.row_starts),
         ];
         self.gpu.dispatch(&RASTER, "rows", &bindings, groups(triangles))?;
-        self.scan(&self.row_starts, triangles + 1)?;
+        self.gpu.scan(&self.row_starts, triangles + 1)?;
         bindings.push((4, &self.starts));
         self.gpu
             .dispatch(&RASTER, "count", &bindings, groups(self.rows))?;
-        let layers = self.scan(&self.starts, self.texels() + 1)?;
+        let layers = self.gpu.scan(&self.starts, self.texels() + 1)?;
         let total: u32 = self.gpu.read(&self.starts, self.texels(), 1)?[0];
         Ok((u64::from(total), layers))
     }
 
-    fn finish(
-        self,
-        frame: CubeFrame,
-        stats: BuildStats,
-        options: &CubeOptions,
-        count: u64,
-        layers: u32,
-    ) -> Result<Cube<'a>> {
+    fn finish(self, frame: CubeFrame, options: &CubeOptions, count: u64, layers: u32) -> Result<Stacks> {
         let next = self.gpu.storage("the cube's texels", 4 * (self.texels() + 1))?;
         self.gpu.copy(&self.starts, &next, 4 * (self.texels() + 1))?;
         let samples = self.gpu.storage("the cube's samples", SAMPLE * count)?;
@@ -271,12 +259,9 @@ impl<'a> Stage<'a> {
             }
         }
         self.gpu.wait()?;
-        Ok(Cube {
-            gpu: self.gpu,
-            triangles: self.triangles,
+        Ok(Stacks {
             frame,
             layout: self.layout,
-            stats,
             samples: count,
             layers,
             complete: self.layout.conservative == 1,

@@ -14,9 +14,14 @@
 pub(crate) mod build;
 pub(crate) mod layout;
 pub(crate) mod shaders;
+mod still;
 #[cfg(test)]
 mod tests;
 mod trace;
+
+use std::sync::Arc;
+
+pub(crate) use still::StillCube;
 
 use rayward_trace::ldc::{Coverage, CubeFrame, Hierarchy, LdcBuild, StepCounts, TexelSample};
 use rayward_trace::{BuildStats, Triangles};
@@ -48,14 +53,24 @@ impl Default for CubeOptions {
     }
 }
 
-/// A layered depth cube over the triangles of one frame, in a GPU's memory.
+/// The layered depth cube over the triangles of one frame, in a GPU's memory, or two: of what stands still over a row of
+/// frames and of what moves ([`rayward_trace::ldc::StillCube`]).
 #[derive(Debug)]
 pub struct Cube<'a> {
     gpu: &'a Gpu,
     triangles: Triangles<'a>,
+    /// One or two.
+    stacks: Vec<Arc<Stacks>>,
+    stats: BuildStats,
+    /// Triangles whose samples are of this frame.
+    rebuilt: usize,
+}
+
+/// The stacks over some triangles.
+#[derive(Debug)]
+pub(crate) struct Stacks {
     frame: CubeFrame,
     layout: layout::Frame,
-    stats: BuildStats,
     /// Samples of all directions, those that equal depths have left over included.
     samples: u64,
     layers: u32,
@@ -85,49 +100,64 @@ pub struct TraceStats {
     pub steps: StepCounts,
 }
 
+impl Buffers {
+    fn bytes(&self) -> u64 {
+        let all = [
+            &self.frame,
+            &self.positions,
+            &self.indices,
+            &self.starts,
+            &self.samples,
+            &self.cells,
+        ];
+        all.map(Buffer::size).iter().sum()
+    }
+}
+
 impl Cube<'_> {
     /// What was built and what was left out.
     pub fn stats(&self) -> BuildStats {
         self.stats
     }
 
-    /// Where the cube lies.
+    /// Triangles whose samples were made for this frame, not kept from one before.
+    pub fn rebuilt(&self) -> usize {
+        self.rebuilt
+    }
+
+    /// Where the cube lies; the first if there are two.
     pub fn frame(&self) -> CubeFrame {
-        self.frame
+        self.stacks[0].frame
+    }
+
+    /// Texels of all directions.
+    pub fn texels(&self) -> u64 {
+        let texels = |stacks: &Arc<Stacks>| u64::from(stacks.layout.first_texel[3]);
+        self.stacks.iter().map(texels).sum()
     }
 
     /// Samples of all directions.
     pub fn samples(&self) -> u64 {
-        self.samples
+        self.stacks.iter().map(|stacks| stacks.samples).sum()
     }
 
     /// Samples in the fullest texel: VMV07's number of peeling passes.
     pub fn layers(&self) -> u32 {
-        self.layers
+        self.stacks.iter().map(|stacks| stacks.layers).fold(0, u32::max)
     }
 
     /// Memory of the cube on the device in bytes, triangles included.
     pub fn bytes(&self) -> u64 {
-        let b = &self.buffers;
-        [
-            &b.frame,
-            &b.positions,
-            &b.indices,
-            &b.starts,
-            &b.samples,
-            &b.cells,
-        ]
-        .map(Buffer::size)
-        .iter()
-        .sum()
+        self.stacks.iter().map(|stacks| stacks.buffers.bytes()).sum()
     }
 
-    /// All samples of one direction, by texel in memory order, then by depth.
+    /// All samples of one direction, by texel in memory order, then by depth; of the first cube if there are two.
     pub fn texel_samples(&self, axis: usize) -> Result<Vec<TexelSample>> {
-        let [first, end] = [0, 1].map(|i| u64::from(self.layout.first_texel[axis + i]));
-        let starts: Vec<u32> = self.gpu.read(&self.buffers.starts, first, end - first + 1)?;
+        let Stacks { layout, buffers, .. } = &*self.stacks[0];
+        let [first, end] = [0, 1].map(|i| u64::from(layout.first_texel[axis + i]));
+        let starts: Vec<u32> = self.gpu.read(&buffers.starts, first, end - first + 1)?;
         let (from, to) = (u64::from(starts[0]), u64::from(starts[starts.len() - 1]));
-        let samples: Vec<[u32; 3]> = self.gpu.read(&self.buffers.samples, from, to - from)?;
+        let samples: Vec<[u32; 3]> = self.gpu.read(&buffers.samples, from, to - from)?;
         let mut all = Vec::with_capacity(samples.len());
         for (texel, range) in starts.windows(2).enumerate() {
             let [a, b] = [range[0] - starts[0], range[1] - starts[0]].map(|i| i as usize);

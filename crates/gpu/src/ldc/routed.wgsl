@@ -95,22 +95,6 @@ fn crossing(range: vec2f, p: vec3f, q: vec3f, v: f32) -> vec2f {
     return vec2f(min(range.x, u), max(range.y, u));
 }
 
-// Extends a range by an edge's part between two lines v = const.
-fn spanned(range: vec2f, a: vec3f, b: vec3f, lines: vec2f) -> vec2f {
-    let low = min(a.y, b.y);
-    let high = max(a.y, b.y);
-    if high < lines.x || low > lines.y {
-        return range;
-    }
-    let rise = b.y - a.y;
-    var u = vec2f(a.x, b.x);
-    if rise != 0.0 {
-        let v = clamp(lines, vec2f(low), vec2f(high));
-        u = a.x + (b.x - a.x) * clamp((v - a.y) / rise, vec2f(0.0), vec2f(1.0));
-    }
-    return vec2f(min(range.x, min(u.x, u.y)), max(range.y, max(u.x, u.y)));
-}
-
 // Columns of a row that get a sample, from the first to before the second.
 fn columns_of(r: Routed, row: u32) -> vec2u {
     let end = f32(raster_size(r.axis).x);
@@ -125,9 +109,9 @@ fn columns_of(r: Routed, row: u32) -> vec2u {
         return select(vec2u(0u), ends, range.x < range.y);
     }
     let lines = vec2f(f32(row) - REACH, f32(row) + 1.0 + REACH);
-    range = spanned(range, r.a, r.b, lines);
-    range = spanned(range, r.b, r.c, lines);
-    range = spanned(range, r.c, r.a, lines);
+    range = spanned(range, r.a.xy, r.b.xy, lines);
+    range = spanned(range, r.b.xy, r.c.xy, lines);
+    range = spanned(range, r.c.xy, r.a.xy, lines);
     if range.x > range.y {
         return vec2u(0u);
     }

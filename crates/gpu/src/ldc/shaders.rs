@@ -10,6 +10,7 @@ pub(crate) const RASTER: Program = Program {
     name: "raster.wgsl",
     source: concat!(
         include_str!("common.wgsl"),
+        include_str!("span.wgsl"),
         include_str!("routed.wgsl"),
         include_str!("raster.wgsl"),
         include_str!("peel.wgsl"),
@@ -62,9 +63,30 @@ pub(crate) const TREE: Program = Program {
     ),
 };
 
+pub(crate) const GRID: Program = Program {
+    name: "grid.wgsl",
+    source: concat!(
+        include_str!("common.wgsl"),
+        include_str!("span.wgsl"),
+        include_str!("../grid/grid.wgsl"),
+    ),
+};
+
+pub(crate) const LOOK: Program = Program {
+    name: "look.wgsl",
+    source: concat!(
+        include_str!("common.wgsl"),
+        include_str!("query.wgsl"),
+        include_str!("meet.wgsl"),
+        include_str!("../grid/look.wgsl"),
+    ),
+};
+
 /// All programs.
 #[cfg(test)]
-pub(crate) const ALL: [&Program; 7] = [&RASTER, &SCAN, &SORT, &LEVELS, &SAMPLED, &EXACT, &TREE];
+pub(crate) const ALL: [&Program; 9] = [
+    &RASTER, &SCAN, &SORT, &LEVELS, &SAMPLED, &EXACT, &TREE, &GRID, &LOOK,
+];
 
 #[cfg(test)]
 mod tests {
@@ -74,6 +96,7 @@ mod tests {
 
     use super::*;
     use crate::bvh::Node;
+    use crate::grid::{Grid, Place, Plate};
     use crate::ldc::layout::{Found, Frame, Query, Raise, Scan, TexelRay};
 
     fn parsed(program: &Program) -> (naga::Module, ModuleInfo) {
@@ -189,7 +212,12 @@ mod tests {
             TREE, "Node", Node, low_x, high_x, low_y, high_y, low_z, high_z, first, count
         );
         same_layout!(LEVELS, "Raise", Raise, axis, level, rows, rows_below);
-        for program in [SAMPLED, EXACT, TREE] {
+        same_layout!(GRID, "Grid", Grid, columns, rows, plates, cells);
+        same_layout!(
+            GRID, "Plate", Plate, ax, ay, bx, by, cx, cy, depth, prim, first, row
+        );
+        same_layout!(LOOK, "Place", Place, cell, depth, rate, pad);
+        for program in [SAMPLED, EXACT, TREE, LOOK] {
             same_layout!(
                 program, "Ray", TexelRay, origin, end, dir, t_min, t_max, before, skip, pad
             );

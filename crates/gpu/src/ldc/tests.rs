@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use rayward_trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, TexelSample};
 use rayward_trace::{Accel, BruteForce, Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, SurfaceRay};
 
-use super::{Cube, CubeOptions};
+use super::{Cube, CubeOptions, StillCube};
 use crate::tests::{Mesh, Numbers, gpu, meshes, rays};
 use crate::{Error, Gpu};
 
@@ -376,6 +376,64 @@ fn nothing_is_hit_in_an_empty_cube_and_odd_rays_hit_nothing() {
     assert_eq!(hits, truth);
     assert!(cube.closest(&[], &brute).is_ok_and(|(hits, _)| hits.is_empty()));
     assert_eq!(DVec3::ZERO, cube.frame().texel(cube.frame().corner));
+}
+
+#[test]
+fn two_cubes_answer_as_brute_force_does() {
+    let Some(gpu) = gpu() else { return };
+    let (lump, mover) = (Mesh::lump(24), Mesh::lump(6));
+    let frame = |time: f32| {
+        let mut mesh = Mesh::lump(24);
+        let first = mesh.x.len() as u32;
+        mesh.x.extend(mover.x.iter().map(|x| x * 0.3 + 1.2 - time));
+        mesh.y.extend(mover.y.iter().map(|y| y * 0.3));
+        mesh.z.extend(mover.z.iter().map(|z| z * 0.3 + time));
+        mesh.indices
+            .extend(mover.indices.iter().map(|c| c.map(|i| i + first)));
+        mesh
+    };
+    let options = CubeOptions {
+        resolution: 128,
+        ..CubeOptions::default()
+    };
+    let mut still = StillCube::default();
+    let taking_part = |mesh: &Mesh| built(&gpu, mesh, &options).stats().triangles;
+    let (all, moving) = (taking_part(&frame(0.0)), taking_part(&mover));
+    for (n, expected) in [all, all, moving, moving].into_iter().enumerate() {
+        let mesh = frame(n as f32 * 0.4);
+        let (brute, bvh) = (BruteForce::new(mesh.triangles()), Bvh::build(mesh.triangles()));
+        let cube = still.build(&gpu, mesh.triangles(), &options);
+        let cube = cube.unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(cube.rebuilt(), expected, "frame {n}");
+        assert_eq!(cube.stacks.len(), if n == 0 { 1 } else { 2 });
+        let rays = rays(n as u64, 2000);
+        let (hits, stats) = cube.closest(&rays, &bvh).unwrap_or_else(|e| panic!("{e}"));
+        let (mut of_mover, mut lit) = (0, 0);
+        let light = Light::Point(Vec3::new(1.6, 0.3, 1.2));
+        let mut queries = Vec::new();
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert_eq!(*hit, brute.intersect(ray), "frame {n}: {ray:?}");
+            of_mover += usize::from(hit.is_some_and(|hit| hit.prim as usize >= lump.indices.len()));
+            if let Some((prim, hit)) = brute.closest(ray) {
+                queries.push((Receiver::on_surface(ray, hit.t, prim), light));
+            }
+        }
+        assert!(of_mover > 10, "frame {n}: {of_mover}");
+        assert!(stats.unsure < rays.len() / 10, "{stats:?}");
+        let (dark, _) = cube.shadowed(&queries, &bvh).unwrap_or_else(|e| panic!("{e}"));
+        for ((receiver, light), dark) in queries.iter().zip(&dark) {
+            assert_eq!(*dark, brute.shadowed(receiver, light), "{receiver:?}");
+            lit += usize::from(!dark);
+        }
+        assert!(lit > 50 && lit + 50 < queries.len(), "{lit} of {}", queries.len());
+        let test = HitTest::Plane { margin: 0.25 };
+        let (planes, _) = cube
+            .closest_sampled(&rays, test)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let alike = planes.iter().zip(&hits);
+        let alike = alike.filter(|(a, b)| a.is_some() == b.is_some()).count();
+        assert!(alike * 100 > rays.len() * 97, "{alike} alike by samples");
+    }
 }
 
 #[test]

@@ -3,13 +3,12 @@
 use rayon::prelude::*;
 use rayward_trace::exact;
 use rayward_trace::ldc::HitTest;
-use rayward_trace::{Accel, Bvh, Hit, Light, Ray, Receiver, SurfaceRay};
+use rayward_trace::{Accel, Bvh, Hit, Light, Ray, Receiver, SurfaceRay, ViewRay};
 
-use super::layout::Query;
 use super::shaders::{EXACT, SAMPLED};
-use super::{Cube, TraceStats};
+use super::{Cube, Stacks, TraceStats};
 use crate::Result;
-use crate::batch::{HIT, Line, QUERY, SurfaceHit, Traced};
+use crate::batch::{Asked, HIT, Line, Structure, SurfaceHit, Traced};
 
 impl Cube<'_> {
     /// The closest hits, equal to [`rayward_trace::BruteForce`]'s bit for bit. `cpu`, over the same triangles, is
@@ -27,6 +26,14 @@ impl Cube<'_> {
     /// Those of the device.
     pub fn after(&self, rays: &[SurfaceRay], cpu: &Bvh) -> Result<(Vec<SurfaceHit>, TraceStats)> {
         self.exact().after(rays, cpu)
+    }
+
+    /// The first triangle in front of the start of each ray.
+    ///
+    /// # Errors
+    /// Those of the device.
+    pub fn seen(&self, rays: &[ViewRay], cpu: &Bvh) -> Result<(Vec<Option<u32>>, TraceStats)> {
+        self.exact().seen(rays, cpu)
     }
 
     /// Whether some triangle lies between each receiver and its light: [`Accel::shadowed`] of arrays.
@@ -48,21 +55,12 @@ impl Cube<'_> {
             HitTest::Interval { tolerance } => (1, tolerance),
             HitTest::Plane { margin } => (2, margin),
         };
-        let query = Query {
-            test: kind,
-            tolerance,
-            ..QUERY
-        };
-        let answers = self.sampled().trace(rays.len(), |i| Line::of(&rays[i]), query)?;
-        let hits = (0..rays.len())
-            .into_par_iter()
-            .map(|i| {
-                let (found, prepared) = (&answers.found[i], &answers.prepared[i]);
-                let t = prepared.start + f64::from(found.t) / prepared.scale;
-                (answers.state(i) == HIT).then(|| self.sampled_hit(&rays[i], t, found.prim))
-            })
-            .collect();
-        Ok((hits, answers.stats()))
+        let asked = Asked::Sample(kind, tolerance);
+        let answers = self.sampled().trace(rays.len(), |i| Line::of(&rays[i]), asked)?;
+        let hits = answers.each.par_iter().zip(rays).map(|(answer, ray)| {
+            (answer.state == HIT).then(|| self.sampled_hit(ray, answer.hit.t, answer.prim))
+        });
+        Ok((hits.collect(), answers.stats()))
     }
 
     /// The hit of a sample, moved into its triangle.
@@ -80,8 +78,10 @@ impl Cube<'_> {
 
     fn exact(&self) -> Traced<'_> {
         let mut traced = self.sampled();
-        let b = &self.buffers;
-        traced.bindings.extend([(1, &b.positions), (2, &b.indices)]);
+        for (structure, stacks) in traced.structures.iter_mut().zip(&self.stacks) {
+            let b = &stacks.buffers;
+            structure.bindings.extend([(1, &b.positions), (2, &b.indices)]);
+        }
         Traced {
             program: &EXACT,
             entry: "trace_exact",
@@ -90,16 +90,24 @@ impl Cube<'_> {
     }
 
     fn sampled(&self) -> Traced<'_> {
-        let b = &self.buffers;
         Traced {
             gpu: self.gpu,
             triangles: self.triangles,
-            frame: self.frame,
-            empty: self.samples == 0,
-            complete: self.complete,
             program: &SAMPLED,
             entry: "trace_sampled",
-            bindings: vec![(0, &b.frame), (3, &b.starts), (4, &b.samples), (5, &b.cells)],
+            structures: self.stacks.iter().map(|stacks| structure(stacks)).collect(),
         }
+    }
+}
+
+/// Stacks without the triangles that exact answers need.
+fn structure(stacks: &Stacks) -> Structure<'_> {
+    let b = &stacks.buffers;
+    Structure {
+        frame: stacks.frame,
+        empty: stacks.samples == 0,
+        complete: stacks.complete,
+        bindings: vec![(0, &b.frame), (3, &b.starts), (4, &b.samples), (5, &b.cells)],
+        placing: None,
     }
 }

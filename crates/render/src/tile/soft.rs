@@ -10,6 +10,7 @@ use rayward_trace::{AreaLight, Light, Receiver, Samples, Tile, exact};
 use super::{TileShader, TileWork};
 use crate::RenderOptions;
 use crate::geometry::triangles;
+use crate::secondary::SecondaryTracer;
 use crate::shade::{direct, direct_from};
 use crate::structures::LightShadows;
 
@@ -39,6 +40,42 @@ fn fill_up(
         receivers.resize(size, Receiver::free(DVec3::NAN));
         pixels.resize(size, 0);
     }
+}
+
+/// Asks for the samples that each receiver sees as one array; returns how many were asked for. Who fails to answer has
+/// nothing see anything.
+fn ask(
+    arrays: &dyn SecondaryTracer,
+    area: &AreaLight,
+    samples: &Samples,
+    (receivers, pixels): (&[Receiver], &[u32]),
+    bits: &mut Vec<u32>,
+) -> u64 {
+    let of = |(receiver, pixel): (&Receiver, &u32)| {
+        let (receiver, pixel) = (*receiver, *pixel);
+        (0..samples.count()).map(move |k| (receiver, area.sample(samples, pixel, receiver.point, k)))
+    };
+    let somebody = |(receiver, _): &(&Receiver, &u32)| !receiver.point.is_nan();
+    let queries: Vec<(Receiver, Light)> = receivers
+        .iter()
+        .zip(pixels)
+        .filter(somebody)
+        .flat_map(of)
+        .collect();
+    let hidden = arrays.hidden(&queries).unwrap_or_default();
+    let mut answers = hidden.chunks(samples.count() as usize);
+    bits.clear();
+    for receiver in receivers {
+        let own = bits.len();
+        bits.resize(own + samples.words(), 0);
+        if receiver.point.is_nan() {
+            continue;
+        }
+        for (k, hidden) in answers.next().unwrap_or_default().iter().enumerate() {
+            bits[own + k / 32] |= u32::from(!hidden) << (k % 32);
+        }
+    }
+    queries.len() as u64
 }
 
 impl TileShader<'_> {
@@ -121,6 +158,12 @@ impl TileShader<'_> {
         match (&self.structures.lights[light], &self.reference) {
             (LightShadows::Area(tree), _) => tree.visible(receivers, pixels, samples, scratch, visible),
             (LightShadows::AreaGrid(grid), _) => grid.visible(receivers, pixels, samples, scratch, visible),
+            (LightShadows::Asked, _) => {
+                let Some(arrays) = &self.structures.arrays else {
+                    return false;
+                };
+                scratch.counts.samples += ask(&**arrays, area, samples, (receivers, pixels), visible);
+            }
             (_, Some(every)) => {
                 let opaque = |prim| self.is_opaque(prim);
                 every.visible(&opaque, area, samples, (receivers, pixels), visible);

@@ -55,11 +55,7 @@ pub enum Clipped {
 impl CubeFrame {
     /// The frame around all triangles that take part, `resolution` texels along the longest side of their box.
     pub fn around(triangles: &Triangles, prims: &[u32], resolution: u32) -> Self {
-        let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-        let (low, high) = prims.iter().fold(nothing, |(low, high), &prim| {
-            let [a, b, c] = triangles.corners(prim);
-            (low.min(a.min(b).min(c)), high.max(a.max(b).max(c)))
-        });
+        let (low, high) = bounds(triangles, prims);
         if prims.is_empty() {
             return Self {
                 corner: DVec3::ZERO,
@@ -79,6 +75,14 @@ impl CubeFrame {
             side,
             size,
         }
+    }
+
+    /// The resolution at which a frame around these triangles has about the texels of this one.
+    pub fn resolution_of(&self, triangles: &Triangles, prims: &[u32]) -> u32 {
+        let (low, high) = bounds(triangles, prims);
+        let extent = (high.as_dvec3() - low.as_dvec3()).max_element();
+        // Casts saturate; of nothing it is the least.
+        (extent / self.side).ceil().max(0.0) as u32 + 2
     }
 
     /// A point in texel coordinates.
@@ -117,6 +121,14 @@ impl CubeFrame {
             Clipped::Misses
         }
     }
+}
+
+fn bounds(triangles: &Triangles, prims: &[u32]) -> (Vec3, Vec3) {
+    let nothing = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    prims.iter().fold(nothing, |(low, high), &prim| {
+        let [a, b, c] = triangles.corners(prim);
+        (low.min(a.min(b).min(c)), high.max(a.max(b).max(c)))
+    })
 }
 
 /// An upper end of a range, moved out beyond the error of a hit's parameter.

@@ -13,6 +13,9 @@
 //!   [`crate::exact`] decides on those whose plane the ray crosses there. Answers equal [`crate::BruteForce`]'s bit
 //!   for bit.
 //!
+//! A frame of an animation may have two of them, one of what has stood still so far and is kept ([`StillCube`]), one of
+//! what moves; a ray is followed through the one it enters first, and what it meets there shortens it for the other.
+//!
 //! Layout: 4 bytes a texel, 8 or 12 bytes a sample (`ldc/samples.rs`), 16 bytes a cell (`ldc/levels.rs`); texels in
 //! tiles of 8 x 8. Limits: rays that start more than 2^36 texels away test every triangle; triangles much larger than
 //! the scene's rest leave all of that in few texels, which stays right but slow.
@@ -23,12 +26,14 @@ mod levels;
 mod raster;
 mod sampled;
 mod samples;
+mod still;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod walk;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -37,6 +42,7 @@ pub use levels::Hierarchy;
 pub use raster::Coverage;
 pub use sampled::HitTest;
 pub use samples::{DepthFormat, TexelSample};
+pub use still::{StillCube, Stillness};
 pub use walk::{StepCounts, Steps};
 
 use crate::brute::{hit_in_range, rounded, write_sorted};
@@ -108,17 +114,101 @@ impl LdcOptions {
     }
 }
 
-/// A layered depth cube over the triangles of one frame. See the [module](self).
+/// The layered depth cube over the triangles of one frame, or two: of what stands still and of what moves. See the
+/// [module](self).
 #[derive(Clone, Debug)]
 pub struct Ldc<'a> {
     triangles: Triangles<'a>,
+    /// One or two.
+    cubes: Vec<Arc<Cube>>,
+    stats: BuildStats,
+    /// Triangles whose samples are of this frame.
+    rebuilt: usize,
+}
+
+/// Three stacks over some of the triangles.
+#[derive(Debug)]
+struct Cube {
     /// Those that take part.
     prims: Vec<u32>,
     frame: CubeFrame,
     stacks: [Stack; 3],
-    stats: BuildStats,
     /// Whether its samples name every triangle over a texel.
     complete: bool,
+}
+
+impl Cube {
+    fn over(triangles: &Triangles, prims: Vec<u32>, options: &LdcOptions) -> Self {
+        let frame = build::fitting_frame(triangles, &prims, options);
+        let stacks = build::build(&frame, triangles, &prims, options);
+        Self {
+            prims,
+            frame,
+            stacks,
+            complete: options.build == LdcBuild::Csr(Coverage::Conservative),
+        }
+    }
+
+    fn clip(&self, line: &Line) -> Clipped {
+        self.frame.clip(line.origin, line.dir, line.t_min, line.t_max)
+    }
+
+    fn bytes(&self) -> usize {
+        let stack = |s: &Stack| {
+            let cells: usize = s.levels.iter().map(|l| size_of_val(&*l.cells)).sum();
+            size_of_val(&*s.starts) + s.samples.bytes() + cells
+        };
+        size_of_val(&*self.prims) + self.stacks.iter().map(stack).sum::<usize>()
+    }
+
+    /// [`Ldc::candidates`] of one cube, for a line clipped to it. Returns whether `visit` broke.
+    #[inline(always)]
+    fn candidates(
+        &self,
+        clipped: Clipped,
+        t_end: &mut f64,
+        steps: &mut impl Steps,
+        visit: &mut impl FnMut(u32, &mut f64) -> ControlFlow<()>,
+    ) -> bool {
+        let inside = match clipped {
+            Clipped::Inside(inside) if self.complete => inside,
+            Clipped::Misses => return false,
+            _ => {
+                return self.prims.iter().any(|&prim| {
+                    steps.triangle();
+                    visit(prim, t_end).is_break()
+                });
+            }
+        };
+        // Where the line leaves the cube is no end of it.
+        let mut end = inside.t_max.min(*t_end);
+        let mut visit = |prim: u32, end: &mut f64| {
+            let flow = visit(prim, t_end);
+            *end = end.min(*t_end);
+            flow
+        };
+        for axis in axis_order(inside.dir) {
+            let stack = &self.stacks[axis];
+            let broken = match &stack.samples {
+                Samples::F16(s) => crossed(stack, s, &inside, &mut end, steps, &mut visit),
+                Samples::U16(s) => crossed(stack, s, &inside, &mut end, steps, &mut visit),
+                Samples::F32(s) => crossed(stack, s, &inside, &mut end, steps, &mut visit),
+            };
+            if broken {
+                return true;
+            }
+        }
+        false
+    }
+}
+
+/// Where a clipped line enters; what cannot be clipped comes first.
+fn entry(clipped: &Clipped) -> f64 {
+    match clipped {
+        Clipped::Inside(inside) => inside.t_min,
+        Clipped::Misses => f64::INFINITY,
+        Clipped::TooFar => f64::NEG_INFINITY,
+    }
 }
 
 /// Directions in the order they are searched: the one along which the ray runs most has the shortest way through
@@ -157,15 +247,11 @@ impl<'a> Ldc<'a> {
     /// Builds over all triangles that are finite and have area, in parallel; the same for any number of threads.
     pub fn build(triangles: Triangles<'a>, options: &LdcOptions) -> Self {
         let (prims, stats) = build::usable(&triangles);
-        let frame = build::fitting_frame(&triangles, &prims, options);
-        let stacks = build::build(&frame, &triangles, &prims, options);
         Self {
             triangles,
-            prims,
-            frame,
-            stacks,
+            cubes: vec![Arc::new(Cube::over(&triangles, prims, options))],
+            rebuilt: stats.triangles,
             stats,
-            complete: options.build == LdcBuild::Csr(Coverage::Conservative),
         }
     }
 
@@ -174,24 +260,35 @@ impl<'a> Ldc<'a> {
         self.stats
     }
 
+    /// Triangles whose samples were made for this frame, not kept from one before.
+    pub fn rebuilt(&self) -> usize {
+        self.rebuilt
+    }
+
     /// Side of a texel, in units of the triangles.
     pub fn texel_size(&self) -> f64 {
-        self.frame.side
+        self.frame().side
     }
 
-    /// Texels along each axis, margins included.
+    /// Texels along each axis, margins included; of the first cube if there are two.
     pub fn size(&self) -> [u32; 3] {
-        self.frame.size
+        self.frame().size
     }
 
-    /// Where the cube lies.
+    /// Where the cube lies; the first if there are two.
     pub fn frame(&self) -> CubeFrame {
-        self.frame
+        self.cubes[0].frame
     }
 
-    /// All samples of one direction, by texel in memory order, then by depth.
+    /// Texels of all directions.
+    pub fn texels(&self) -> usize {
+        let stacks = self.cubes.iter().flat_map(|cube| &cube.stacks);
+        stacks.map(|stack| stack.raster.texels()).sum()
+    }
+
+    /// All samples of one direction, by texel in memory order, then by depth; of the first cube if there are two.
     pub fn texel_samples(&self, axis: usize) -> Vec<TexelSample> {
-        let stack = &self.stacks[axis];
+        let stack = &self.cubes[0].stacks[axis];
         match &stack.samples {
             Samples::F16(s) => samples::listed(stack, s),
             Samples::U16(s) => samples::listed(stack, s),
@@ -201,21 +298,19 @@ impl<'a> Ldc<'a> {
 
     /// Samples of each direction.
     pub fn samples(&self) -> [usize; 3] {
-        [0, 1, 2].map(|axis| self.stacks[axis].samples.len())
+        let of = |axis: usize| self.cubes.iter().map(move |cube| cube.stacks[axis].samples.len());
+        [0, 1, 2].map(|axis| of(axis).sum())
     }
 
     /// Samples in the fullest texel of each direction: VMV07's number of layered depth images.
     pub fn layers(&self) -> [u32; 3] {
-        [0, 1, 2].map(|axis| self.stacks[axis].layers)
+        let of = |axis: usize| self.cubes.iter().map(move |cube| cube.stacks[axis].layers);
+        [0, 1, 2].map(|axis| of(axis).fold(0, u32::max))
     }
 
     /// Memory of the cube in bytes, the triangles themselves left out.
     pub fn bytes(&self) -> usize {
-        let stack = |s: &Stack| {
-            let cells: usize = s.levels.iter().map(|l| size_of_val(&*l.cells)).sum();
-            size_of_val(&*s.starts) + s.samples.bytes() + cells
-        };
-        size_of_val(&*self.prims) + self.stacks.iter().map(stack).sum::<usize>()
+        self.cubes.iter().map(|cube| cube.bytes()).sum()
     }
 
     /// [`Accel::intersect`] in f64, counting the work.
@@ -272,33 +367,21 @@ impl<'a> Ldc<'a> {
         steps: &mut impl Steps,
         mut visit: impl FnMut(u32, &mut f64) -> ControlFlow<()>,
     ) {
-        if !valid || self.prims.is_empty() {
+        if !valid {
             return;
         }
-        let clipped = self.frame.clip(line.origin, line.dir, line.t_min, line.t_max);
-        let inside = match clipped {
-            Clipped::Inside(inside) if self.complete => inside,
-            Clipped::Misses => return,
-            _ => {
-                let mut t_end = line.t_max;
-                for &prim in &self.prims {
-                    steps.triangle();
-                    if visit(prim, &mut t_end).is_break() {
-                        return;
-                    }
-                }
-                return;
-            }
-        };
-        let mut t_end = inside.t_max;
-        for axis in axis_order(inside.dir) {
-            let stack = &self.stacks[axis];
-            let broken = match &stack.samples {
-                Samples::F16(s) => crossed(stack, s, &inside, &mut t_end, steps, &mut visit),
-                Samples::U16(s) => crossed(stack, s, &inside, &mut t_end, steps, &mut visit),
-                Samples::F32(s) => crossed(stack, s, &inside, &mut t_end, steps, &mut visit),
-            };
-            if broken {
+        let mut in_order = [None, None];
+        for (slot, cube) in in_order.iter_mut().zip(&self.cubes) {
+            *slot = Some((cube, cube.clip(line)));
+        }
+        if let [Some(one), Some(other)] = &in_order
+            && entry(&other.1) < entry(&one.1)
+        {
+            in_order.swap(0, 1);
+        }
+        let mut t_end = line.t_max;
+        for (cube, clipped) in in_order.into_iter().flatten() {
+            if cube.candidates(clipped, &mut t_end, steps, &mut visit) {
                 return;
             }
         }

@@ -18,7 +18,7 @@ use super::frame::{Clipped, TexelRay};
 use super::raster::NO_PLANE;
 use super::samples::{Depth, Sample, Samples};
 use super::walk::{Segment, Steps, walk};
-use super::{Ldc, axis_order};
+use super::{Cube, Ldc, axis_order};
 use crate::exact;
 use crate::{Hit, Ray};
 
@@ -135,28 +135,53 @@ impl Ldc<'_> {
         }
         let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));
         let (origin, dir) = (ray.origin.as_dvec3(), ray.dir.as_dvec3());
-        let Clipped::Inside(inside) = self.frame.clip(origin, dir, t_min, t_max) else {
-            return None;
-        };
         let mut best = None;
-        let mut t_end = inside.t_max;
-        for axis in axis_order(inside.dir) {
-            let stack = &self.stacks[axis];
-            let found = match &stack.samples {
-                Samples::F16(s) => in_stack(stack, s, &inside, test, [t_min, t_max], &mut t_end, steps),
-                Samples::U16(s) => in_stack(stack, s, &inside, test, [t_min, t_max], &mut t_end, steps),
-                Samples::F32(s) => in_stack(stack, s, &inside, test, [t_min, t_max], &mut t_end, steps),
+        for cube in &self.cubes {
+            let t_end = best.map_or(t_max, |(t, _)| t);
+            let Clipped::Inside(inside) = cube.frame.clip(origin, dir, t_min, t_end) else {
+                continue;
             };
-            // A plane's margin may put a hit beyond one found before.
-            best = match (best, found) {
-                (Some(old), Some(new)) => Some(if nearer(&new, &old) { new } else { old }),
-                (old, new) => new.or(old),
-            };
+            best = nearest(best, cube.search(&inside, test, any, [t_min, t_max], steps));
             if any && best.is_some() {
                 break;
             }
         }
         best
+    }
+}
+
+impl Cube {
+    fn search(
+        &self,
+        inside: &TexelRay,
+        test: HitTest,
+        any: bool,
+        range: [f64; 2],
+        steps: &mut impl Steps,
+    ) -> Option<(f64, u32)> {
+        let mut best = None;
+        let mut t_end = inside.t_max;
+        for axis in axis_order(inside.dir) {
+            let stack = &self.stacks[axis];
+            let found = match &stack.samples {
+                Samples::F16(s) => in_stack(stack, s, inside, test, range, &mut t_end, steps),
+                Samples::U16(s) => in_stack(stack, s, inside, test, range, &mut t_end, steps),
+                Samples::F32(s) => in_stack(stack, s, inside, test, range, &mut t_end, steps),
+            };
+            best = nearest(best, found);
+            if any && best.is_some() {
+                break;
+            }
+        }
+        best
+    }
+}
+
+/// The nearer of two hits: a plane's margin may put one beyond one found before.
+fn nearest(old: Option<(f64, u32)>, new: Option<(f64, u32)>) -> Option<(f64, u32)> {
+    match (old, new) {
+        (Some(old), Some(new)) => Some(if nearer(&new, &old) { new } else { old }),
+        (old, new) => new.or(old),
     }
 }
 

@@ -69,7 +69,7 @@ fn sweeping_and_peeling_make_the_same_samples() {
             });
             assert!(swept.samples().iter().sum::<usize>() > 100);
             assert_eq!(swept.layers(), peeled.layers());
-            for (a, b) in swept.stacks.iter().zip(&peeled.stacks) {
+            for (a, b) in swept.cubes[0].stacks.iter().zip(&peeled.cubes[0].stacks) {
                 assert_eq!(a, b);
             }
         }
@@ -78,8 +78,9 @@ fn sweeping_and_peeling_make_the_same_samples() {
 
 #[test]
 fn layers_are_sorted_and_their_number_is_the_depth_complexity() {
-    let ldc = Ldc::build(Mesh::soup(2, 300, 0.3, 1.0).triangles(), &options(CENTRE)).stacks;
-    for stack in &ldc {
+    let mesh = Mesh::soup(2, 300, 0.3, 1.0);
+    let ldc = Ldc::build(mesh.triangles(), &options(CENTRE));
+    for stack in &ldc.cubes[0].stacks {
         let samples = listed(stack);
         let mut fullest = 0;
         for list in samples.chunk_by(|a, b| a.2 == b.2) {
@@ -97,7 +98,7 @@ fn every_triangle_goes_to_the_direction_it_faces() {
         let triangles = mesh.triangles();
         let ldc = Ldc::build(triangles, &LdcOptions::default());
         let mut direction = vec![None; triangles.len()];
-        for stack in &ldc.stacks {
+        for stack in &ldc.cubes[0].stacks {
             for (prim, _, _) in listed(stack) {
                 let axis = direction[prim as usize].get_or_insert(stack.raster.axis);
                 assert_eq!(*axis, stack.raster.axis);
@@ -125,7 +126,7 @@ fn cells_bound_their_samples() {
                 ..options(CENTRE)
             };
             let ldc = Ldc::build(mesh.triangles(), &options);
-            for stack in &ldc.stacks {
+            for stack in &ldc.cubes[0].stacks {
                 for (_, depth, texel) in listed(stack) {
                     let (tile, within) = (texel / 64, texel % 64);
                     let columns = stack.raster.size[0] as usize / 8;
@@ -315,8 +316,8 @@ fn building_does_not_depend_on_the_number_of_threads() {
             .num_threads(threads)
             .build()
             .expect("a pool");
-        pool.install(|| Ldc::build(mesh.triangles(), &options(LdcOptions::default().build)))
-            .stacks
+        let ldc = pool.install(|| Ldc::build(mesh.triangles(), &options(LdcOptions::default().build)));
+        ldc.cubes[0].stacks.clone()
     };
     let one = with(1);
     assert!(one == with(2) && one == with(5));
