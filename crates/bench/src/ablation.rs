@@ -8,7 +8,7 @@ use rayward::trace::{Binning, EyeGridOptions, FaceOptions, LightGridOptions, Sim
 
 use crate::contender::{FrameKind, Job};
 use crate::frames::{Drawer, FramesReport, TOLERATED_SHARE, measure_frame};
-use crate::ours::{Rayward, Ways};
+use crate::ours::{LookUp, Rayward, Ways};
 use crate::{BenchScene, Machine, Result};
 
 /// What is measured.
@@ -118,19 +118,24 @@ fn eye_ways(usual: Ways) -> [Ways; 4] {
     ]
 }
 
-fn hard_ways(usual: Ways) -> [Ways; 4] {
+fn hard_ways(usual: Ways) -> [Ways; 6] {
     let casters = CasterPolicy::Both;
-    let looked_up = Some(LightGridOptions::default());
+    let looked_up = |name, in_what| Ways {
+        looked_up: Some(in_what),
+        ..named(name, usual)
+    };
     let paper = Ways {
         eye: eye_as_in_the_paper(usual),
         clusters: false,
-        looked_up: Some(LightGridOptions::paper()),
+        looked_up: Some(LookUp::Grid(LightGridOptions::paper())),
         ..usual
     };
     let keeps_memory = false;
     [
         named("both sides cast", Ways { casters, ..usual }),
-        named("looked up in a grid", Ways { looked_up, ..usual }),
+        looked_up("looked up in a grid", LookUp::Grid(LightGridOptions::default())),
+        looked_up("looked up in a grid, dark cells", LookUp::DarkCells),
+        looked_up("looked up in a tree", LookUp::Tree),
         named(
             "memory made anew",
             Ways {

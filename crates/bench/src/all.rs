@@ -2,14 +2,15 @@
 //!
 //! What falls short comes first.
 
+use rayward::scene;
 use rayward::trace::SimdLevel;
-use rayward::{RenderOptions, Renderer, ToneMap, ToneMapper, image_io, scene};
 use serde::Serialize;
 
 use crate::ablation::{self, AblationOptions};
 use crate::build::{self, BuildOptions, BuildReport};
 use crate::claims::{Claim, Verdict};
 use crate::frames::{self, FramesOptions, FramesReport};
+use crate::pictures;
 use crate::report::{Document, Item, Picture, Section, sections};
 use crate::scaling::{self, ScalingOptions, ScalingReport};
 use crate::structures::{self, RayClass, StructuresOptions, StructuresReport};
@@ -52,6 +53,9 @@ pub struct AllReport {
     /// Pictures of what was measured.
     #[serde(skip)]
     pub pictures: Vec<Picture>,
+    /// What rays cost in one of them, pixel by pixel.
+    #[serde(skip)]
+    pub heat_maps: Vec<Picture>,
 }
 
 /// Ratios to the fastest other ray tracer that Rayward is made for, by kind of frame.
@@ -112,7 +116,8 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         ablation: ablation::measure(&some, &of_ablations(options), progress)?,
         structures: structures::measure(&some, &of_structures(options), progress)?,
         scaling: scaling::measure(&scaling, progress)?,
-        pictures: pictures(quick, progress)?,
+        pictures: pictures::of_scenes(quick, progress)?,
+        heat_maps: pictures::heat_maps(quick, progress)?,
     })
 }
 
@@ -157,43 +162,13 @@ fn of_structures(options: &AllOptions) -> StructuresOptions {
     }
 }
 
-/// Small pictures of some built-in scenes.
-fn pictures(quick: bool, progress: &mut dyn FnMut(&str)) -> Result<Vec<Picture>> {
-    let [width, height] = if quick { [32, 20] } else { [480, 300] };
-    let picture = |name: &&str| {
-        progress(&format!("picture of {name}"));
-        let scene = scene::builtin::build(name)?;
-        let frame = scene.at(0.0);
-        let options = RenderOptions {
-            width,
-            height,
-            pixel_samples: 4,
-            ..RenderOptions::default()
-        };
-        let rendered =
-            Renderer::new(&scene).render(&frame, &frame.cameras[0], &frame.lights, &options, &|_| {})?;
-        let rgb = ToneMapper::new(ToneMap::None).encode(&rendered.film);
-        let mut png = Vec::new();
-        image_io::encode_png(&mut png, width, height, &rgb)?;
-        Ok(Picture {
-            name: (*name).into(),
-            caption: format!("{name}, {} triangles", frame.triangle_count()),
-            png,
-        })
-    };
-    ["courtyard", "forest", "conference", "teapot-mirror"]
-        .iter()
-        .map(picture)
-        .collect()
-}
-
 impl AllReport {
     /// The whole report.
     pub fn sections(&self) -> Vec<Section> {
-        let mut pictures = Section::new("Some of the scenes");
-        pictures
-            .items
-            .extend(self.pictures.iter().cloned().map(Item::Picture));
+        let pictures = |title: &str, pictures: &[Picture]| Section {
+            items: pictures.iter().cloned().map(Item::Picture).collect(),
+            ..Section::new(title)
+        };
         let mut all = vec![self.overview()];
         let mut frames = sections::frames(&self.frames).into_iter();
         all.extend(frames.next());
@@ -202,7 +177,8 @@ impl AllReport {
         all.extend(sections::scaling(&self.scaling));
         all.extend(sections::ablation(&self.ablation));
         all.extend(sections::structures(&self.structures));
-        all.push(pictures);
+        all.push(pictures("Some of the scenes", &self.pictures));
+        all.push(pictures("Where rays are dear", &self.heat_maps));
         all.extend(frames);
         all
     }

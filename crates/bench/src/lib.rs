@@ -35,6 +35,7 @@ mod packet;
 mod papers;
 mod peers;
 mod picture;
+mod pictures;
 pub mod report;
 pub mod scaling;
 mod scene;

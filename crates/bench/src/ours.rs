@@ -7,14 +7,26 @@ use std::sync::Mutex;
 
 use rayon::prelude::*;
 use rayward::trace::{
-    AreaLightGrid, AreaLightTree, AreaScratch, BLOCK_LANES, Casts, EyeGrid, EyeGridOptions, FaceOptions,
-    Facets, Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PointLightGrid, Receiver, SeenTile,
-    ShadowScratch, SimdLevel, Tile, TileHits, TileSamples, Visibility, darken, darken_unlit, exact,
+    AreaLightGrid, AreaLightTree, AreaScratch, BLOCK_LANES, CastRule, Casts, EyeGrid, EyeGridOptions,
+    FaceOptions, Facets, Light, LightGridOptions, LightQuery, LitPixels, LitScratch, PointLightGrid,
+    PointLightTree, Receiver, SeenTile, ShadowScratch, SimdLevel, Tile, TileHits, TileSamples, Visibility,
+    darken, darken_unlit, exact,
 };
 use rayward::{CasterPolicy, CasterRules};
 
 use crate::contender::{Contender, FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::{Picture, Time};
+
+/// A structure of casters in which hard shadows are looked up pixel by pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum LookUp {
+    /// A grid.
+    Grid(LightGridOptions),
+    /// A grid whose cells also know what lies in the dark behind them.
+    DarkCells,
+    /// A tree.
+    Tree,
+}
 
 /// How Rayward draws: as it usually does, or with something taken away.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +39,8 @@ pub(crate) struct Ways {
     pub(crate) eye: EyeGridOptions,
     /// Whether that grid is built over clusters.
     pub(crate) clusters: bool,
-    /// Grid of casters in which hard shadows are looked up pixel by pixel, instead of all at once.
-    pub(crate) looked_up: Option<LightGridOptions>,
+    /// Where hard shadows are looked up, instead of found for all pixels at once.
+    pub(crate) looked_up: Option<LookUp>,
     /// Whether memory is kept from frame to frame.
     pub(crate) keeps_memory: bool,
     /// Grids through which soft shadows are followed, instead of a tree.
@@ -93,7 +105,7 @@ impl Contender for Rayward {
                 0
             }
             FrameKind::EyeHard => match self.ways.looked_up {
-                Some(options) => self.draw_looked_up(job, &eye, &facets, options, picture),
+                Some(in_what) => self.draw_looked_up(job, &eye, &facets, in_what, picture),
                 None => self.draw_hard(job, &eye, &facets, picture),
             },
             FrameKind::EyeSoft => match &self.ways.followed {
@@ -169,25 +181,26 @@ impl Rayward {
         })
     }
 
-    /// Hard shadows from a grid of casters, tile by tile, as HM08 has them.
+    /// Hard shadows from a structure of casters, tile by tile, as HM08 has them.
     fn draw_looked_up(
         &self,
         job: &Job,
         eye: &EyeGrid,
         facets: &Facets,
-        options: LightGridOptions,
+        in_what: LookUp,
         picture: &mut Picture,
     ) -> u64 {
-        let triangles = job.scene.triangles();
-        let grid = self.with_rule(job, job.light, |rule| {
-            PointLightGrid::build(job.light, triangles, rule, options, self.level(job))
-        });
+        let casters = self.with_rule(job, job.light, |rule| self.casters(job, in_what, rule));
         let tiles = picture.tiles_mut().map_init(AskingWork::default, |work, out| {
             let tile = eye.tile(out.index);
             eye.trace_tile(&tile, &mut work.hits);
             facets.shade(&work.hits, out.corner, out.stride, out.blocks);
             work.receive(facets, &tile, job);
-            grid.shadowed(&work.receivers, &mut work.scratch, &mut work.shadow);
+            let (scratch, shadow) = (&mut work.scratch, &mut work.shadow);
+            match &casters {
+                Casters::Grid(grid) => grid.shadowed(&work.receivers, scratch, shadow),
+                Casters::Tree(tree) => tree.shadowed(&work.receivers, scratch, shadow),
+            }
             for (&[block, lane], &shadow) in work.places.iter().zip(&work.shadow) {
                 work.lit[block][lane] = u8::from(!shadow);
             }
@@ -197,6 +210,27 @@ impl Rayward {
             work.receivers.len() as u64
         });
         tiles.sum()
+    }
+
+    /// The structure in which hard shadows are looked up.
+    fn casters<'s>(&self, job: &Job<'s>, in_what: LookUp, rule: CastRule) -> Casters<'s> {
+        let (light, triangles, level) = (job.light, job.scene.triangles(), self.level(job));
+        match in_what {
+            LookUp::Grid(options) => {
+                Casters::Grid(PointLightGrid::build(light, triangles, rule, options, level))
+            }
+            LookUp::DarkCells => {
+                let options = LightGridOptions {
+                    receivers: u64::from(job.view.width) * u64::from(job.view.height) / 2,
+                    ..LightGridOptions::default()
+                };
+                let topology = &job.scene.topology;
+                Casters::Grid(PointLightGrid::build_with_topology(
+                    light, triangles, topology, rule, options, level,
+                ))
+            }
+            LookUp::Tree => Casters::Tree(PointLightTree::build(light, triangles, rule, None, level)),
+        }
     }
 
     /// Eye rays and a shadow ray from every hit to each of these lights, one light at a time, without shading; gives
@@ -249,12 +283,7 @@ impl Rayward {
     }
 
     /// What each triangle casts in this light, given to `use_it`.
-    fn with_rule<R>(
-        &self,
-        job: &Job,
-        light: Light,
-        use_it: impl FnOnce(&(dyn Fn(u32) -> Casts + Sync)) -> R,
-    ) -> R {
+    fn with_rule<R>(&self, job: &Job, light: Light, use_it: impl FnOnce(CastRule) -> R) -> R {
         if self.ways.casters == CasterPolicy::Both {
             return use_it(&|_| Casts::Both);
         }
@@ -293,6 +322,12 @@ fn draw_followed(
         work.receivers.len() as u64 * u64::from(job.samples.count())
     });
     tiles.sum()
+}
+
+/// A light's casters, in which receivers are looked up.
+enum Casters<'s> {
+    Grid(PointLightGrid<'s>),
+    Tree(PointLightTree<'s>),
 }
 
 /// Working memory of a thread for shadows tile by tile.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use glam::DQuat;
-use rayward::image_io::{MovieOptions, is_movie, write_movie};
+use rayward::image_io::{MovieOptions, is_movie, remove_abandoned, write_movie};
 use rayward::scene::{FrameGeometry, PosedCamera};
 use rayward::{FrameStats, RenderOptions, RenderedFrame, Renderer};
 use serde::Serialize;
@@ -89,6 +89,9 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         .filter(|&frame| !(args.frames.resume && numbered(&args.output, frame).is_file()))
         .collect();
 
+    if args.frames.resume {
+        clean_up(&args.output)?;
+    }
     bar.phase("rendering");
     bar.frames(wanted.len() as u64);
     let mut renderer = Renderer::new(&input.scene);
@@ -233,6 +236,18 @@ impl FrameReport {
             peak_memory_bytes: machine::peak_memory(),
         }
     }
+}
+
+/// Removes what a run that was killed has left unfinished where the frames go.
+fn clean_up(pattern: &Path) -> Result<(), Failure> {
+    let folder = match pattern.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    if let Some(ending) = pattern.extension().and_then(|ending| ending.to_str()) {
+        remove_abandoned(folder, ending)?;
+    }
+    Ok(())
 }
 
 /// Where a frame goes, checked.

@@ -11,8 +11,8 @@ use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse, Shadows, Shown,
-    Size, Span, Up,
+    self, Antialiasing, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse,
+    Shadows, Shown, Size, Span, Up,
 };
 
 const HELP: &str = "\
@@ -41,6 +41,7 @@ Examples:
   rayward render city.glb --camera-position 40,30,60 --light sun:1,2,1 -o city.png
   rayward render --builtin walker --time 0.4 --shutter 0.04 --pixel-samples 32 -o walk.png
   rayward render --aperture 0.2 --focus 8 -o blurred.png
+  rayward render --antialias coverage -o smooth.png
   rayward render model.glb --environment sky.hdr --exposure auto -o model.png
   rayward render model.glb --light square:0,3,1:0.5 --samples 64 -o soft.png
   rayward render model.glb --layers depth,normal -o model.exr
@@ -297,7 +298,7 @@ pub(crate) struct FrameArgs {
     /// The camera goes around the scene, by so many degrees over all frames
     #[arg(long, value_name = "DEGREES", value_parser = values::degrees, allow_hyphen_values = true)]
     pub(crate) turn: Option<f64>,
-    /// Frames whose file is there are left out
+    /// Frames whose file is there are left out, and what a killed run has left unfinished is removed
     #[arg(long)]
     pub(crate) resume: bool,
     /// The I-th of N shares of the frames, I/N
@@ -352,9 +353,15 @@ pub(crate) struct PictureArgs {
     /// How many of these may be diffuse, for light from other surfaces; needs many samples
     #[arg(long, value_name = "NUMBER", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=64))]
     pub(crate) diffuse_bounces: u32,
-    /// Eye rays a pixel, whose mean it is, against jagged edges and noise; 1, or 16 with a lens or a shutter
+    /// Eye rays a pixel, whose mean it is, against jagged edges and noise; 1, or 16 with a lens, a shutter or --antialias
+    /// coverage
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=65536))]
     pub(crate) pixel_samples: Option<u32>,
+    /// How many of these are shaded. coverage has smooth edges, also of hard shadows, for a fraction of the time; its
+    /// --pixel-samples are 16 unless given
+    #[arg(long, value_name = "WAY", default_value = "samples",
+        conflicts_with_all = ["paper", "reference", "aperture", "shutter", "shadow_structure"])]
+    pub(crate) antialias: Antialiasing,
     /// How a pixel weighs its samples, without a lens or a shutter
     #[arg(long, value_name = "FILTER", default_value = "blackman-harris")]
     pub(crate) pixel_filter: Filter,

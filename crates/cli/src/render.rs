@@ -4,7 +4,8 @@ use std::time::Instant;
 
 use rayward::scene::{FrameGeometry, PosedCamera};
 use rayward::{
-    Environment, Lens, Moment, Progress, RenderOptions, RenderedFrame, Renderer, Shutter, add_motion,
+    Antialias, Environment, Lens, Moment, Progress, RenderOptions, RenderedFrame, Renderer, Shutter,
+    add_motion,
 };
 
 use crate::args::{PictureArgs, RenderArgs, RunArgs, ViewArgs};
@@ -16,7 +17,7 @@ use crate::output::Targets;
 use crate::progress::Bar;
 use crate::report;
 use crate::summary::{Summary, Times};
-use crate::values::{GpuUse, Size};
+use crate::values::{Antialiasing, GpuUse, Size};
 use crate::view::View;
 
 /// Renders, writes and tells what it cost.
@@ -189,8 +190,13 @@ pub(crate) fn picture(
 /// `pixel` is what it takes in bytes, film and writing together.
 pub(crate) fn check_memory(options: &RenderOptions, pixel: u64) -> Result<(), Failure> {
     let (width, height) = (options.width, options.height);
-    // Colour and alpha once more, to sum them up.
-    let mean = if options.pixel_samples > 1 { 16 } else { 0 };
+    let mean = match options.antialias {
+        _ if options.pixel_samples <= 1 => 0,
+        // Colour and alpha once more, and some shares of 40 bytes.
+        Antialias::Coverage => 80,
+        // Colour and alpha once more, to sum them up.
+        _ => 16,
+    };
     let bytes = u128::from(width) * u128::from(height) * u128::from(pixel + mean);
     match machine::available_memory() {
         Some(memory) if bytes > u128::from(memory) => Err(Failure::new(
@@ -228,7 +234,8 @@ pub(crate) fn lens(args: &PictureArgs, camera: &PosedCamera, frame: &FrameGeomet
 pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
     let defaults = RenderOptions::default();
     let size = size(args, &defaults);
-    let spread = args.aperture.is_some() || args.shutter.is_some();
+    let coverage = args.antialias == Antialiasing::Coverage;
+    let several = args.aperture.is_some() || args.shutter.is_some() || coverage;
     RenderOptions {
         width: size.width,
         height: size.height,
@@ -244,7 +251,8 @@ pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
         bounces: args.bounces,
         diffuse_bounces: args.diffuse_bounces.min(args.bounces),
         pixel_filter: args.pixel_filter.into(),
-        pixel_samples: args.pixel_samples.unwrap_or(if spread { 16 } else { 1 }),
+        pixel_samples: args.pixel_samples.unwrap_or(if several { 16 } else { 1 }),
+        antialias: args.antialias.into(),
         paper: args.paper,
         reference: args.reference,
         ..defaults

@@ -1,7 +1,9 @@
 //! Values of the command line: parsed, checked, and nothing else.
 
 use glam::{DVec3, Vec3};
-use rayward::{CasterPolicy, LayerKind, Layers, Measure, PixelFilter, ShadowStructure, Shard, scene};
+use rayward::{
+    Antialias, CasterPolicy, LayerKind, Layers, Measure, PixelFilter, ShadowStructure, Shard, scene,
+};
 
 /// What a parser returns.
 type Parsed<T> = Result<T, String>;
@@ -317,6 +319,24 @@ impl From<Shadows> for ShadowStructure {
             Shadows::Receivers => Self::Receivers,
             Shadows::Grid => Self::Grid,
             Shadows::Tree => Self::Tree,
+        }
+    }
+}
+
+/// Which of a pixel's samples are shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum Antialiasing {
+    /// All
+    Samples,
+    /// Of those that see one smooth surface in the same light the first
+    Coverage,
+}
+
+impl From<Antialiasing> for Antialias {
+    fn from(antialiasing: Antialiasing) -> Self {
+        match antialiasing {
+            Antialiasing::Samples => Self::Samples,
+            Antialiasing::Coverage => Self::Coverage,
         }
     }
 }

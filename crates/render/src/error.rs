@@ -91,6 +91,12 @@ pub enum Error {
         /// The layer's name.
         layer: &'static str,
     },
+    /// Samples of a pixel cannot be shaded as one in such a frame.
+    #[error("antialiasing by coverage does not go together with {with}")]
+    Antialias {
+        /// What else was asked for.
+        with: &'static str,
+    },
     /// The camera has no usable picture: a lens or an axis that is not finite, or out of range.
     #[error("camera {name:?}: {problem}")]
     Camera {

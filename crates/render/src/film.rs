@@ -489,6 +489,11 @@ impl TileMut<'_> {
         Some(&mut self.cost.get_mut(y as usize)?[x as usize])
     }
 
+    /// One row of alpha; `None` if the film does not hold it.
+    pub(crate) fn alpha_row(&mut self, y: u32) -> Option<&mut [f32]> {
+        Some(self.alpha.get_mut(y as usize)?)
+    }
+
     /// One row of colours, for tiles that are written row by row.
     pub fn color_row(&mut self, y: u32) -> &mut [Vec3] {
         self.color[y as usize]

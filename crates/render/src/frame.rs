@@ -4,22 +4,22 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-use rayon::prelude::*;
 use rayward_scene::{FrameGeometry, PosedCamera, PosedLight, Scene};
 use rayward_trace::{Clusters, LitScratch, Topology};
 
 use crate::casters::{CasterRules, transparent_triangles};
 use crate::distributed::{self, Shutter};
+use crate::gather::{self, Gather};
 use crate::geometry::triangles;
 use crate::light_stats::light_stats;
-use crate::mean::Mean;
 use crate::plan::FramePlan;
 use crate::reference::EveryTriangle;
 use crate::secondary::{HierarchyBuilder, SecondaryBuilder, SecondaryTracer};
 use crate::shard::{Ingredients, Part};
 use crate::solids::{self, FrameSolids};
 use crate::structures::FrameStructures;
-use crate::tile::{TileCounts, TileShader, TileWork};
+use crate::tile::coverage::Sharing;
+use crate::tile::{TileCounts, TileShader};
 use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
 
 /// Renders frames of one scene. Keeps what outlives a frame: materials, textures, the topology and clusters.
@@ -79,7 +79,7 @@ impl<'s> Renderer<'s> {
     /// threads and any instruction set. `progress` is told after each tile, from any thread.
     ///
     /// # Errors
-    /// [`crate::Error::ImageSize`] and [`crate::Error::Camera`].
+    /// [`crate::Error::ImageSize`], [`crate::Error::Camera`] and [`crate::Error::Antialias`].
     ///
     /// # Panics
     /// If the geometry is not of the renderer's scene.
@@ -95,6 +95,7 @@ impl<'s> Renderer<'s> {
             let still = Shutter { geometry, camera };
             return self.render_shutter(geometry, camera, still, lights, options, progress);
         }
+        gather::check(options, false)?;
         let posed = camera;
         let camera = CameraFrame::new(posed, geometry.origin, options.width, options.height)?;
         let mut film = Film::new(options.width, options.height, options.layers)?;
@@ -112,7 +113,10 @@ impl<'s> Renderer<'s> {
         let eye = camera.vantage();
         let samples = options.pixel_samples.max(1);
         let shifted = |sample: u32| view.shifted(options.pixel_filter.offset(sample));
-        let first = shifted(samples - 1);
+        let sharing = || Sharing::new(self.scene, geometry, options);
+        let mut gather = Gather::new(options, &film, sharing)?;
+        let order = gather.order(options);
+        let first = shifted(order[0]);
         let with = (&*self.secondary, std::mem::take(&mut self.scratch));
         let mut structures =
             FrameStructures::build(&plan, first, geometry, clusters, &rules, eye, options, with);
@@ -131,11 +135,9 @@ impl<'s> Renderer<'s> {
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             progress(Progress { done, total });
         };
-        let mut mean = (samples > 1).then(|| Mean::new(&film));
         let mut counts = TileCounts::default();
-        // The centres come last and leave what the film's other layers hold.
-        for sample in (0..samples).rev() {
-            if sample + 1 < samples {
+        for &sample in &order {
+            if sample != order[0] {
                 structures.look(shifted(sample), &plan, geometry, clusters, &rules, eye, options);
                 solids = solids.map(|solids| solids.looking(shifted(sample)));
             }
@@ -157,15 +159,10 @@ impl<'s> Renderer<'s> {
                 sample,
                 options,
             };
-            counts = counts.sum(render_tiles(&shader, &mut film, &told));
+            counts = counts.sum(gather.render(&shader, &mut film, &told));
             counts = counts.sum(structures.counts());
-            if let Some(mean) = &mut mean {
-                mean.add(&film);
-            }
         }
-        if let Some(mean) = mean {
-            mean.finish(&mut film);
-        }
+        gather.finish(&mut film, structures.eye.tile_side());
         self.mark(&mut film, geometry, posed, None, lights, options);
         let mut stats = stats(geometry, options, counts);
         stats.lights = light_stats(&plan, &structures.lights);
@@ -192,6 +189,7 @@ impl<'s> Renderer<'s> {
         options: &RenderOptions,
         progress: &(dyn Fn(Progress) + Sync),
     ) -> Result<RenderedFrame> {
+        gather::check(options, true)?;
         let opening = (geometry, camera);
         let mut rendered = distributed::render(
             (self.scene, &self.shader),
@@ -271,24 +269,4 @@ fn stats(geometry: &FrameGeometry, options: &RenderOptions, counts: TileCounts) 
         surfaces: counts.surfaces,
         ..FrameStats::default()
     }
-}
-
-/// Renders all tiles of one sample of the pixels.
-fn render_tiles(shader: &TileShader, film: &mut Film, told: &(impl Fn() + Sync)) -> TileCounts {
-    let side = shader.structures.eye.tile_side();
-    film.tiles_mut(side, side)
-        .par_iter_mut()
-        .enumerate()
-        .map_init(TileWork::default, |work, (index, out)| {
-            let index = index as u32;
-            let wanted = shader.options.renders(&shader.structures.eye.tile(index));
-            let counts = if wanted {
-                shader.render(index, work, out)
-            } else {
-                TileCounts::default()
-            };
-            told();
-            counts
-        })
-        .reduce(TileCounts::default, TileCounts::sum)
 }

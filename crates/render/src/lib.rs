@@ -33,6 +33,7 @@ pub mod environment;
 mod error;
 mod film;
 mod frame;
+mod gather;
 mod geometry;
 mod heat_map;
 pub mod image_io;
@@ -70,7 +71,7 @@ pub use image_io::{Picture, read_picture};
 pub use lens::Lens;
 pub use light_stats::{LightStats, LightSteps};
 pub use motion::{Moment, add_motion};
-pub use options::{CasterPolicy, RenderOptions, ShadowStructure};
+pub use options::{Antialias, CasterPolicy, RenderOptions, ShadowStructure};
 pub use pixel_filter::PixelFilter;
 pub use plan::{FramePlan, LightPlan};
 pub use secondary::{

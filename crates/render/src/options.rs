@@ -35,6 +35,8 @@ pub struct RenderOptions {
     /// Eye rays a pixel, whose mean it is: as many frames, or with a lens or a shutter distributed rays, see
     /// [`crate::Renderer::render_shutter`].
     pub pixel_samples: u32,
+    /// How many of them are shaded.
+    pub antialias: Antialias,
     /// How they lie about the pixel, but for distributed rays.
     pub pixel_filter: PixelFilter,
     /// The lens of the camera; `None` is a pinhole, before which all is sharp.
@@ -73,6 +75,7 @@ impl Default for RenderOptions {
             bounces: 8,
             diffuse_bounces: 0,
             pixel_samples: 1,
+            antialias: Antialias::Samples,
             pixel_filter: PixelFilter::default(),
             lens: None,
             samples: 8,
@@ -84,6 +87,19 @@ impl Default for RenderOptions {
             level: SimdLevel::detect(),
         }
     }
+}
+
+/// Which of a pixel's samples are shaded.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Antialias {
+    /// All.
+    #[default]
+    Samples,
+    /// Of those that see one smooth surface in the same hard light the first. Edges, also of hard shadows, are as smooth; what
+    /// is drawn by chance is as noisy as with one sample. Not with a lens, a shutter, HM08's parameters, for references, or
+    /// with a structure of casters for all shadows.
+    Coverage,
 }
 
 /// Which sides of triangles cast shadows.

@@ -17,7 +17,7 @@ use rayward_trace::{AreaLight, Cone, EyeGridOptions, FaceOptions, Light, LightGr
 use crate::bounce::GLOSSY;
 use crate::casters::CasterRules;
 use crate::geometry::{shadow_end, triangles};
-use crate::{RenderOptions, ShadowStructure};
+use crate::{Antialias, RenderOptions, ShadowStructure};
 
 /// The structures of one frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,6 +121,8 @@ impl FramePlan {
     ) -> Self {
         // Layers behind each other are receivers of their own, and the paper looks each ray up.
         let one_surface = !rules.any_transparent() && !options.paper;
+        // Shares of pixels know a light by a bit a pixel.
+        let for_shares = options.antialias == Antialias::Coverage;
         // Half of what is seen is turned away from a light.
         let pixels = u64::from(options.width) * u64::from(options.height) / 2;
         for plan in self
@@ -132,7 +134,7 @@ impl FramePlan {
             plan.grid.receivers = pixels;
             plan.structure = match plan.structure {
                 ShadowStructure::Receivers if !one_surface => ShadowStructure::Grid,
-                ShadowStructure::Auto if options.reference || (one_surface && together) => {
+                ShadowStructure::Auto if options.reference || (one_surface && (together || for_shares)) => {
                     ShadowStructure::Receivers
                 }
                 ShadowStructure::Auto => {

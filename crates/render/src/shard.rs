@@ -196,6 +196,7 @@ impl Checksum {
             bounces,
             diffuse_bounces,
             pixel_samples,
+            antialias,
             pixel_filter,
             lens,
             samples,
@@ -210,7 +211,7 @@ impl Checksum {
         self.text(&(width, height, lens, samples, seed, paper, reference));
         self.text(&(shadows, casters, tinted_shadows, ambient, background));
         self.text(&(show_environment, environment_samples, bounces, diffuse_bounces));
-        self.text(&(pixel_samples, pixel_filter));
+        self.text(&(pixel_samples, antialias, pixel_filter));
     }
 
     fn geometry(&mut self, geometry: &FrameGeometry) {

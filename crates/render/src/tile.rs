@@ -1,6 +1,7 @@
 //! One tile: eye hits, surfaces, shadows light by light, colours (HM08 §3: eye rays drive everything, shadow
 //! rays are spawned for a tile of hits at a time).
 
+pub(crate) mod coverage;
 mod passes;
 pub(crate) mod soft;
 mod solids;
@@ -25,6 +26,7 @@ use crate::solids::{FrameSolids, OnSolid};
 use crate::structures::{FrameStructures, LightShadows};
 use crate::{CameraFrame, Environment, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
+use coverage::{Sharing, TileShares};
 use passes::Passes;
 
 /// Everything a tile needs to know of its frame.
@@ -144,8 +146,14 @@ fn in_blocks(width: u32, height: u32) -> impl Iterator<Item = [u32; 2]> {
 const INVISIBLE: f32 = 1.0 / 512.0;
 
 impl TileShader<'_> {
-    /// Renders the tile of that index into its part of the film.
-    pub(crate) fn render(&self, index: u32, work: &mut TileWork, out: &mut TileMut) -> TileCounts {
+    /// Renders the tile of that index into its part of the film; what its shares know of already is left out.
+    pub(crate) fn render(
+        &self,
+        index: u32,
+        work: &mut TileWork,
+        mut shares: Option<(&Sharing, &mut TileShares)>,
+        out: &mut TileMut,
+    ) -> TileCounts {
         let tile = self.structures.eye.tile(index);
         // References trace pixel by pixel.
         let traced = self.structures.visibility.is_some() || self.reference.is_some();
@@ -166,6 +174,11 @@ impl TileShader<'_> {
         work.scratch.counts = rayward_trace::ShadowCounts::default();
         work.area.counts = AreaCounts::default();
         for [x, y] in in_blocks(tile.width, tile.height) {
+            if let Some((sharing, shares)) = &mut shares
+                && self.joins(sharing, shares, &tile, [x, y], work)
+            {
+                continue;
+            }
             let sample = self.see(&tile, [x, y], work);
             out.put(x, y, &sample);
         }
@@ -186,6 +199,9 @@ impl TileShader<'_> {
             self.measure(measured, work, out);
         }
         self.go_on(&tile, work, out);
+        if let Some((_, shares)) = shares {
+            shares.keep(out);
+        }
         TileCounts {
             shadow_rays: work.scratch.counts.receivers + work.area.counts.samples + work.bounce.shadow_rays,
             secondary_rays: work.bounce.secondary_rays,

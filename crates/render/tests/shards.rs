@@ -2,7 +2,7 @@
 
 use rayward::image_io::{join_parts, write_exr};
 use rayward::scene::{FrameGeometry, Scene, builtin};
-use rayward::{Film, Layers, Lens, RenderOptions, Renderer, Shard, Shutter};
+use rayward::{Antialias, Film, Layers, Lens, RenderOptions, Renderer, Shard, Shutter};
 
 fn options() -> RenderOptions {
     RenderOptions {
@@ -65,6 +65,12 @@ fn parts_joined_are_the_whole() {
         ..options()
     };
     check("blob-1k", false, &paper);
+    let coverage = RenderOptions {
+        antialias: Antialias::Coverage,
+        pixel_samples: 4,
+        ..options()
+    };
+    check("courtyard", false, &coverage);
 }
 
 #[test]
@@ -101,6 +107,10 @@ fn a_part_knows_its_picture() {
         RenderOptions { seed: 1, ..first },
         RenderOptions { width: 134, ..first },
         RenderOptions { bounces: 7, ..first },
+        RenderOptions {
+            antialias: Antialias::Coverage,
+            ..first
+        },
     ] {
         assert_ne!(picture(&other), own);
     }

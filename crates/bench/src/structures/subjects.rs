@@ -3,9 +3,9 @@
 use rayward::trace::ldc::{HitTest, Steps};
 use rayward::trace::space::World;
 use rayward::trace::{
-    Accel, AreaLightTree, AreaScratch, BruteForce, Bvh, Candidates, Casts, Count, Counters, FaceOptions,
-    Grid3, Hit, Ldc, LdcOptions, Light, LightGridOptions, PerspectiveGrids, PointLightGrid, Ray, Receiver,
-    ShadowScratch, SimdLevel, exact,
+    Accel, AreaLightGrid, AreaLightTree, AreaScratch, BruteForce, Bvh, Candidates, Casts, Count, Counters,
+    FaceOptions, Grid3, Hit, Ldc, LdcOptions, Light, LightGridOptions, PerspectiveGrids, PointLightGrid,
+    PointLightTree, Ray, Receiver, Samples, ShadowScratch, SimdLevel, exact,
 };
 
 use super::rays::{Answer, Asked, RaySet, in_tile, visibility};
@@ -95,7 +95,9 @@ pub(super) fn all<'s>(
     subjects.push(eye_rays(&job));
     subjects.push(lit_pixels(&job));
     subjects.push(light_grid(scene, &job));
+    subjects.push(light_tree(scene, &job));
     subjects.push(area_tree(scene, &job));
+    subjects.push(area_grid(scene, &job));
     subjects.push(brute(scene));
     if options.peers {
         for tree in [ObvhsTree::Wide, ObvhsTree::Binary] {
@@ -313,26 +315,48 @@ fn light_grid<'s>(scene: &'s BenchScene, job: &Job) -> Subject<'s> {
     let (light, level) = (job.light, job.level);
     let build = || PointLightGrid::build(light, scene.triangles(), &|_| Casts::Both, options, level);
     let (grid, build) = Stopwatch::time(build);
-    let cost = (build, Some(grid.bytes()));
-    at_once(
-        "light grid",
+    let (what, cost) = (
         "perspective grid of the light, casters in cells",
-        cost,
-        move |set, answers| {
-            let (RayClass::Hard, Asked::Shadow(pairs)) = (set.class, &set.asked) else {
-                return false;
-            };
-            let receivers: Vec<Receiver> = pairs.iter().map(|(receiver, _)| *receiver).collect();
-            let mut shadow = Vec::new();
-            let mut scratch = ShadowScratch::default();
-            answers.clear();
-            for receivers in receivers.chunks(4096) {
-                grid.shadowed(receivers, &mut scratch, &mut shadow);
-                answers.extend(shadow.iter().map(|&shadow| Answer::shadow(shadow)));
-            }
-            true
-        },
-    )
+        (build, Some(grid.bytes())),
+    );
+    hard_shadows("light grid", what, cost, move |receivers, scratch, shadow| {
+        grid.shadowed(receivers, scratch, shadow);
+    })
+}
+
+fn light_tree<'s>(scene: &'s BenchScene, job: &Job) -> Subject<'s> {
+    let (light, level) = (job.light, job.level);
+    let build = || PointLightTree::build(light, scene.triangles(), &|_| Casts::Both, None, level);
+    let (tree, build) = Stopwatch::time(build);
+    let (what, cost) = (
+        "hierarchy in the light's perspective space",
+        (build, Some(tree.bytes())),
+    );
+    hard_shadows("light tree", what, cost, move |receivers, scratch, shadow| {
+        tree.shadowed(receivers, scratch, shadow);
+    })
+}
+
+/// What takes receivers of the scene's light.
+fn hard_shadows<'s>(
+    name: &str,
+    what: &'static str,
+    cost: (Time, Option<usize>),
+    shadowed: impl Fn(&[Receiver], &mut ShadowScratch, &mut Vec<bool>) + Send + Sync + 's,
+) -> Subject<'s> {
+    at_once(name, what, cost, move |set, answers| {
+        let (RayClass::Hard, Asked::Shadow(pairs)) = (set.class, &set.asked) else {
+            return false;
+        };
+        let receivers: Vec<Receiver> = pairs.iter().map(|(receiver, _)| *receiver).collect();
+        let (mut scratch, mut shadow) = (ShadowScratch::default(), Vec::new());
+        answers.clear();
+        for receivers in receivers.chunks(4096) {
+            shadowed(receivers, &mut scratch, &mut shadow);
+            answers.extend(shadow.iter().map(|&shadow| Answer::shadow(shadow)));
+        }
+        true
+    })
 }
 
 fn area_tree<'s>(scene: &'s BenchScene, job: &Job) -> Subject<'s> {
@@ -340,27 +364,60 @@ fn area_tree<'s>(scene: &'s BenchScene, job: &Job) -> Subject<'s> {
     let build = || AreaLightTree::build(area, scene.triangles(), &|_| Casts::Both, level);
     let (tree, build) = Stopwatch::time(build);
     let tree = tree.with_topology(&scene.topology);
-    let cost = (build, Some(tree.bytes()));
-    at_once(
-        "area tree",
+    let (what, cost) = (
         "hierarchy in the area light's perspective space",
+        (build, Some(tree.bytes())),
+    );
+    soft_shadows(
+        "area tree",
+        what,
         cost,
-        move |set, answers| {
-            let (RayClass::Soft, Asked::Shadow(pairs)) = (set.class, &set.asked) else {
-                return false;
-            };
-            let of_each = pairs.iter().step_by(SOFT_SAMPLES as usize);
-            let receivers: Vec<Receiver> = of_each.map(|(receiver, _)| *receiver).collect();
-            let pixels: Vec<u32> = set.pixels.iter().map(|&[x, y]| sample_set(x, y)).collect();
-            let (mut scratch, mut bits) = (AreaScratch::default(), Vec::new());
-            tree.visible(&receivers, &pixels, &set.job.samples, &mut scratch, &mut bits);
-            answers.clear();
-            for bits in &bits {
-                answers.extend((0..SOFT_SAMPLES).map(|k| Answer::shadow(bits >> k & 1 == 0)));
-            }
-            true
+        move |receivers, pixels, samples, scratch, bits| {
+            tree.visible(receivers, pixels, samples, scratch, bits);
         },
     )
+}
+
+fn area_grid<'s>(scene: &'s BenchScene, job: &Job) -> Subject<'s> {
+    let (area, cells) = (job.area, FaceOptions::paper());
+    let build = || AreaLightGrid::build(area, scene.triangles(), &|_| Casts::Both, &cells);
+    let (grid, build) = Stopwatch::time(build);
+    let (what, cost) = (
+        "3-D perspective grid of the area light, as in HM08",
+        (build, Some(grid.bytes())),
+    );
+    soft_shadows(
+        "area grid",
+        what,
+        cost,
+        move |receivers, pixels, samples, scratch, bits| {
+            grid.visible(receivers, pixels, samples, scratch, bits);
+        },
+    )
+}
+
+/// What takes receivers of the scene's area light, a sample set for each, and gives a bit for each sample seen.
+fn soft_shadows<'s>(
+    name: &str,
+    what: &'static str,
+    cost: (Time, Option<usize>),
+    visible: impl Fn(&[Receiver], &[u32], &Samples, &mut AreaScratch, &mut Vec<u32>) + Send + Sync + 's,
+) -> Subject<'s> {
+    at_once(name, what, cost, move |set, answers| {
+        let (RayClass::Soft, Asked::Shadow(pairs)) = (set.class, &set.asked) else {
+            return false;
+        };
+        let of_each = pairs.iter().step_by(SOFT_SAMPLES as usize);
+        let receivers: Vec<Receiver> = of_each.map(|(receiver, _)| *receiver).collect();
+        let pixels: Vec<u32> = set.pixels.iter().map(|&[x, y]| sample_set(x, y)).collect();
+        let (mut scratch, mut bits) = (AreaScratch::default(), Vec::new());
+        visible(&receivers, &pixels, &set.job.samples, &mut scratch, &mut bits);
+        answers.clear();
+        for bits in &bits {
+            answers.extend((0..SOFT_SAMPLES).map(|k| Answer::shadow(bits >> k & 1 == 0)));
+        }
+        true
+    })
 }
 
 /// Pairs of ray and triangle that brute force takes on; it answers as many rays as that.

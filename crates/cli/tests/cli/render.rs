@@ -401,3 +401,27 @@ fn a_lens_and_a_shutter() {
     assert!(refused.stderr.contains("--aperture"), "{}", refused.stderr);
     folder.run(&small(&["--aperture", "0"])).expect(2);
 }
+
+#[test]
+fn antialiasing_by_coverage() {
+    let folder = Folder::new();
+    let run = |more: &[&str]| folder.run(&small(&[&["--json", "-q"], more].concat()));
+    let number = |more: &[&str], name: &str| run(more).expect(0).json()[name].as_u64().expect("a number");
+    let coverage = ["--antialias", "coverage"];
+    let pixels = 64 * 48;
+    assert_eq!(number(&coverage, "eye_rays"), 16 * pixels);
+    let few = [&coverage[..], &["--pixel-samples", "4"]].concat();
+    assert_eq!(number(&few, "eye_rays"), 4 * pixels);
+    let all = number(&["--pixel-samples", "4"], "surfaces");
+    assert!(number(&few, "surfaces") < all);
+    for other in [
+        &["--paper"][..],
+        &["--reference"],
+        &["--aperture", "0.1"],
+        &["--shutter", "0.1"],
+        &["--shadow-structure", "grid"],
+    ] {
+        let refused = run(&[&coverage[..], other].concat()).expect(2);
+        assert!(refused.stderr.contains(other[0]), "{}", refused.stderr);
+    }
+}

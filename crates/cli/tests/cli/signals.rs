@@ -114,11 +114,51 @@ fn frames_survive_a_kill() {
         }
     }
     killed.run(&resumed).expect(0);
-    assert_eq!(in_place(), names);
+    assert_eq!(killed.names(), names, "nothing else is left");
     for name in names {
         let [now, then] = [&killed, &whole].map(|folder| std::fs::read(folder.path(&name)).expect("a frame"));
         assert!(now == then, "{name}");
     }
+}
+
+/// Killed while it writes: what is left unfinished is removed by the run that goes on, and nothing else.
+#[test]
+fn a_resumed_run_removes_what_a_kill_left() {
+    let folder = Folder::new();
+    let scene = [
+        "animate",
+        "--builtin",
+        "blob-1k",
+        "--no-shadows",
+        "-q",
+        "--resume",
+    ];
+    let large = ["--resolution", "3000x2000", "--frames", "0..9", "-o", "f#.exr"];
+    let small = ["--resolution", "24x16", "--frames", "0..9", "-o", "f#.exr"];
+    folder.file(".rayward-notes.exr", "of somebody else");
+    let unfinished = || {
+        let names = folder.names().into_iter();
+        names.filter(|name| name.starts_with(".rayward-") && name != ".rayward-notes.exr")
+    };
+    // One that has just got its place by the time of the kill leaves nothing; then the next will.
+    for _ in 0..9 {
+        let command = &mut folder.command(&[&scene[..], &large].concat());
+        let mut child = command.spawn().expect("the program runs");
+        let written = |name: String| std::fs::metadata(folder.path(&name)).is_ok_and(|file| file.len() > 0);
+        wait_until("a file that is being written", || unfinished().any(written));
+        child.kill().expect("it runs");
+        child.wait().expect("it has ended");
+        if unfinished().next().is_some() {
+            break;
+        }
+    }
+    assert_eq!(unfinished().count(), 1);
+    folder.run(&[&scene[..], &small].concat()).expect(0);
+    let frames = (0..9).map(|frame| format!("f{frame}.exr"));
+    let expected: Vec<_> = std::iter::once(".rayward-notes.exr".into())
+        .chain(frames)
+        .collect();
+    assert_eq!(folder.names(), expected);
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! Files as wholes: read at once, written beside their place and renamed.
 //!
 //! A process that is told to end does not unwind, so nothing would remove the files it has begun. They are therefore
-//! listed, and [`discard_unfinished`] removes them from whatever thread the end comes to.
+//! listed, and [`discard_unfinished`] removes them from whatever thread the end comes to. One that is killed leaves them;
+//! while it lives it holds a lock on each, so that [`remove_abandoned`] knows those that nobody works at.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
@@ -36,6 +38,65 @@ pub fn discard_unfinished() -> Discarded {
     Discarded { _lock: files }
 }
 
+/// What names of temporary files begin with; [`RANDOM`] letters and digits follow, then the ending of the target.
+const PREFIX: &str = ".rayward-";
+
+/// Letters and digits that tell temporary files apart.
+const RANDOM: usize = 6;
+
+/// How old an empty file is before it counts as abandoned: it may have been made just now and not be locked yet.
+const ABANDONED_EMPTY: Duration = Duration::from_secs(60);
+
+/// Removes what killed processes have left unfinished in a folder, and tells how many files that were: files that are named
+/// as those of this library with this ending, and locked by nobody. Where files cannot be locked nothing is removed.
+///
+/// # Errors
+/// [`Error::Read`] if the folder cannot be listed, [`Error::Write`] if a file cannot be removed.
+pub fn remove_abandoned(folder: &Path, ending: &str) -> Result<usize> {
+    let entries = fs::read_dir(folder).map_err(|source| Error::read(folder, source))?;
+    let mut removed = 0;
+    for entry in entries {
+        let entry = entry.map_err(|source| Error::read(folder, source))?;
+        if !is_temporary(&entry.file_name().to_string_lossy(), ending) || !is_abandoned(&entry) {
+            continue;
+        }
+        match fs::remove_file(entry.path()) {
+            Ok(()) => removed += 1,
+            // Another process that goes on here was faster.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => (),
+            Err(source) => return Err(Error::write(&entry.path(), source)),
+        }
+    }
+    Ok(removed)
+}
+
+fn is_temporary(name: &str, ending: &str) -> bool {
+    let random = || name.strip_prefix(PREFIX)?.strip_suffix(ending)?.strip_suffix('.');
+    random().is_some_and(|text| text.len() == RANDOM && text.bytes().all(|b| b.is_ascii_alphanumeric()))
+}
+
+/// Whether nobody works at a temporary file.
+#[cfg(unix)]
+fn is_abandoned(entry: &fs::DirEntry) -> bool {
+    let Ok(found) = entry.metadata() else {
+        return false;
+    };
+    // What is written to is locked, so only an empty file can be younger than its lock.
+    let young = || {
+        let age = found.modified().ok().and_then(|at| at.elapsed().ok());
+        age.is_none_or(|age| age < ABANDONED_EMPTY)
+    };
+    found.is_file()
+        && !(found.len() == 0 && young())
+        && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok())
+}
+
+/// Locks keep others from writing there, hence none are held.
+#[cfg(not(unix))]
+fn is_abandoned(_entry: &fs::DirEntry) -> bool {
+    false
+}
+
 /// An entry of the list, taken off when it goes.
 struct Listed(PathBuf);
 
@@ -56,6 +117,9 @@ impl Begun {
         // Made and listed under one lock, so that it is discarded too or not begun at all.
         let mut files = unfinished();
         let file = builder.tempfile_in(folder)?;
+        // Where there are no locks, others leave the file alone.
+        #[cfg(unix)]
+        let _ = file.as_file().try_lock();
         let path = file.path().to_path_buf();
         files.push(path.clone());
         let _listed = Listed(path);
@@ -146,7 +210,7 @@ fn begin(target: &Path, kept: Option<fs::Permissions>) -> io::Result<Begun> {
         suffix
     });
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".rayward-");
+    builder.prefix(PREFIX).rand_bytes(RANDOM);
     if let Some(suffix) = &ending {
         builder.suffix(suffix);
     }
@@ -200,5 +264,38 @@ mod tests {
             1,
             "no temporary file is left"
         );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn only_what_is_certainly_abandoned_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let removed = || remove_abandoned(folder.path(), "png").unwrap();
+        let file = |name: &str, content: &str| fs::write(folder.path().join(name), content).unwrap();
+        let begun = begin(&folder.path().join("a.png"), None).unwrap();
+        begun.file.as_file().write_all(b"so far").unwrap();
+        for kept in [
+            "frame.png",
+            ".rayward-a1B2c3.exr",
+            ".rayward-notes.png",
+            ".rayward-a1-2c3.png",
+            "a.rayward-a1B2c3.png",
+        ] {
+            file(kept, "of others");
+        }
+        file(".rayward-begun1.png", "");
+        fs::create_dir(folder.path().join(".rayward-folder.png")).unwrap();
+        assert_eq!(removed(), 0);
+        file(".rayward-a1B2c3.png", "left by a process that was killed");
+        let empty = File::options()
+            .write(true)
+            .open(folder.path().join(".rayward-begun1.png"))
+            .unwrap();
+        let long_ago = std::time::SystemTime::now() - 2 * ABANDONED_EMPTY;
+        empty.set_modified(long_ago).unwrap();
+        assert_eq!(removed(), 2);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 7);
+        begun.put_in_place(&folder.path().join("a.png")).unwrap();
+        assert_eq!(fs::read(folder.path().join("a.png")).unwrap(), b"so far");
     }
 }

@@ -25,7 +25,7 @@ mod picture;
 mod png;
 
 pub use exr::{encode_exr, write_exr};
-pub use file::{Discarded, discard_unfinished, write_bytes};
+pub use file::{Discarded, discard_unfinished, remove_abandoned, write_bytes};
 pub use movie::{MovieOptions, is_movie, write_movie};
 pub use npy::{encode_npy, write_npy};
 pub use parts::join_parts;
