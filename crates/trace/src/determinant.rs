@@ -62,6 +62,7 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::test_meshes::Numbers;
 
     #[test]
     fn nothing_is_lost_to_cancellation() {
@@ -81,13 +82,8 @@ mod tests {
     /// Vectors that all but lie in a plane, in whole numbers of 40 bits.
     #[test]
     fn what_is_left_is_right_to_the_last_bits() {
-        let mut state = 5u64;
-        let mut whole = |bits: u32| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            i128::from((state as i64) >> (64 - bits))
-        };
+        let mut numbers = Numbers(5);
+        let mut whole = |bits: u32| i128::from((numbers.bits() as i64) >> (64 - bits));
         for _ in 0..2000 {
             let (a, b, off) = (
                 [(); 3].map(|()| whole(40)),
@@ -108,13 +104,8 @@ mod tests {
 
     #[test]
     fn a_ray_almost_in_a_plane_hits_where_the_triangle_is() {
-        let mut state = 7u64;
-        let mut next = |range: i64| {
-            state = state
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (state >> 20) as i64 % range - range / 2
-        };
+        let mut numbers = Numbers(7);
+        let mut next = |range: i64| (numbers.bits() >> 20) as i64 % range - range / 2;
         let (mut hits, mut astray) = (0, 0);
         for _ in 0..4000 {
             let corners: [[i64; 3]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| 3 * next(1 << 15)));

@@ -9,12 +9,17 @@ use crate::view::View;
 pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    pub(crate) fn next(&mut self) -> f32 {
+    /// All 64 bits of the next one; the upper ones are the better ones.
+    pub(crate) fn bits(&mut self) -> u64 {
         self.0 = self
             .0
             .wrapping_mul(6364136223846793005)
             .wrapping_add(1442695040888963407);
-        ((self.0 >> 40) as f32) / (1u64 << 23) as f32 - 1.0
+        self.0
+    }
+
+    pub(crate) fn next(&mut self) -> f32 {
+        ((self.bits() >> 40) as f32) / (1u64 << 23) as f32 - 1.0
     }
 
     pub(crate) fn point(&mut self) -> Vec3 {

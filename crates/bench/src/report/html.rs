@@ -13,7 +13,7 @@ h1 { font-size: 1.7rem } h2 { font-size: 1.25rem; margin-top: 2.2rem; border-bot
 table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; margin: .4rem 0 1.2rem }
 th, td { padding: .18rem .6rem; text-align: right; border-bottom: 1px solid #e6e9ed }
 th { vertical-align: bottom; font-weight: 600 }
-th:first-child, td:first-child { text-align: left }
+th:first-child, td:first-child, .words { text-align: left }
 tbody tr:hover { background: #f3f6f9 }
 .wide { overflow-x: auto }
 figure { margin: 1rem 0 } figure svg, figure img { max-width: 100%; height: auto }
@@ -74,12 +74,17 @@ fn one(index: usize, section: &Section) -> Markup {
 
 fn rows(caption: &str, table: &Table) -> Markup {
     let (heading, rows) = table.rows().split_first().unwrap_or((const { &Vec::new() }, &[]));
+    // A column is of words if they are what its first row begins with.
+    let words = |column: usize| {
+        let first = rows.first().and_then(|row| row.get(column)?.chars().next());
+        first.is_some_and(char::is_alphabetic)
+    };
     html! {
         @if !caption.is_empty() { p { (caption) } }
         div.wide {
             table {
-                thead { tr { @for cell in heading { th { (cell) } } } }
-                tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+                thead { tr { @for (i, cell) in heading.iter().enumerate() { th.words[words(i)] { (cell) } } } }
+                tbody { @for row in rows { tr { @for (i, cell) in row.iter().enumerate() { td.words[words(i)] { (cell) } } } } }
             }
         }
     }

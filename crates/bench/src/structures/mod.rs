@@ -30,6 +30,9 @@ use subjects::Subject;
 /// Share of the rays whose answers may differ: rays of f32 peers through edges and along grazing surfaces.
 pub const TOLERATED_SHARE: f64 = 0.005;
 
+/// Name of what tests every triangle.
+pub const BRUTE: &str = "brute force";
+
 /// What is measured.
 #[derive(Clone, Debug)]
 pub struct StructuresOptions {

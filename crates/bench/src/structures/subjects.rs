@@ -9,7 +9,7 @@ use rayward::trace::{
 };
 
 use super::rays::{Answer, Asked, RaySet, in_tile, visibility};
-use super::{RayClass, Structure, StructuresOptions};
+use super::{BRUTE, RayClass, Structure, StructuresOptions};
 use crate::contender::{FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::embree::{Library, Quality};
 use crate::ours::{Rayward, Ways, eye_grid};
@@ -427,7 +427,7 @@ fn brute(scene: &BenchScene) -> Subject<'_> {
     let brute = BruteForce::new(scene.triangles());
     let most = (PAIRS / scene.triangles().len().max(1)).max(1);
     at_once(
-        "brute force",
+        BRUTE,
         "every triangle in double precision, the definition; of the first rays only",
         (Time::default(), Some(0)),
         move |set, answers| {
