@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use rayward::trace::LdcOptions;
 use rayward::{
     CubeBuilder, Film, HeatMap, Layers, Measure, RenderOptions, Renderer, ToneMap, ToneMapper, image_io,
     scene,
@@ -108,7 +107,7 @@ fn render(name: &str, options: &RenderOptions, cube: bool) -> Result<(Film, usiz
     let frame = scene.at(0.0);
     let mut renderer = Renderer::new(&scene);
     if cube {
-        renderer.set_secondary(Arc::new(CubeBuilder(LdcOptions::default())));
+        renderer.set_secondary(Arc::new(CubeBuilder::default()));
     }
     let rendered = renderer.render(&frame, &frame.cameras[0], &frame.lights, options, &|_| {})?;
     Ok((rendered.film, frame.triangle_count()))
