@@ -72,8 +72,9 @@ pub enum LightShadows<'g> {
 }
 
 impl<'g> FrameStructures<'g> {
-    /// Builds all structures; each build uses all threads. `scratch` is working memory of an earlier frame. Where every pixel shows one surface, lights are done one after
-    /// the other, so that memory does not grow with their number but for a bit a pixel.
+    /// Builds all structures; each build uses all threads. `scratch` is working memory of an earlier frame. Where every pixel
+    /// shows one surface, lights are done one after the other, so that memory does not grow with their number but for a bit a
+    /// pixel.
     pub fn build(
         plan: &FramePlan,
         view: View,
