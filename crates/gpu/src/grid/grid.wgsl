@@ -30,27 +30,12 @@ struct Plate {
 @group(0) @binding(1) var<uniform> grid: Grid;
 @group(0) @binding(2) var<storage, read> plates: array<Plate>;
 // First row of each plate among all rows.
-@group(0) @binding(3) var<storage, read> plate_rows: array<u32>;
+@group(0) @binding(3) var<storage, read> row_starts: array<u32>;
 // Entries of each cell so far, then where its next one goes.
 @group(0) @binding(4) var<storage, read_write> next: array<atomic<u32>>;
 // Triangle and depth.
 @group(0) @binding(5) var<storage, read_write> entries: array<vec2u>;
 @group(0) @binding(6) var<storage, read> cell_starts: array<u32>;
-
-// The plate that a row belongs to: the last that starts at or before it.
-fn plate_of(row: u32) -> u32 {
-    var low = 0u;
-    var high = grid.plates;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if plate_rows[middle] <= row {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
 
 // Cells of a row of a plate, from the first to before the second.
 fn cells_of(plate: Plate, row: u32) -> vec2u {
@@ -77,8 +62,8 @@ fn count(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
     if item >= grid.rows {
         return;
     }
-    let at = plate_of(item);
-    let cells = cells_of(plates[at], plates[at].row + item - plate_rows[at]);
+    let at = owner(item, grid.plates);
+    let cells = cells_of(plates[at], plates[at].row + item - row_starts[at]);
     for (var cell = cells.x; cell < cells.y; cell++) {
         atomicAdd(&next[cell], 1u);
     }
@@ -91,20 +76,28 @@ fn fill(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     if item >= grid.rows {
         return;
     }
-    let at = plate_of(item);
+    let at = owner(item, grid.plates);
     let plate = plates[at];
-    let cells = cells_of(plate, plate.row + item - plate_rows[at]);
+    let cells = cells_of(plate, plate.row + item - row_starts[at]);
     for (var cell = cells.x; cell < cells.y; cell++) {
         entries[atomicAdd(&next[cell], 1u)] = vec2u(plate.prim, bitcast<u32>(plate.depth));
     }
 }
 
-fn nearer(a: vec2u, b: vec2u) -> bool {
+fn load(at: u32) -> vec2u {
+    return entries[at];
+}
+
+fn store(at: u32, entry: vec2u) {
+    entries[at] = entry;
+}
+
+fn before(a: vec2u, b: vec2u) -> bool {
     let depths = vec2f(bitcast<f32>(a.y), bitcast<f32>(b.y));
     return depths.x < depths.y || (depths.x == depths.y && a.x < b.x);
 }
 
-// Each cell's entries by depth, then triangle: Shell sort.
+// Each cell's entries by depth, then triangle.
 @compute @workgroup_size(64)
 fn order(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
          @builtin(local_invocation_index) local: u32) {
@@ -114,20 +107,5 @@ fn order(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
     }
     let first = cell_starts[cell];
     let count = cell_starts[cell + 1u] - first;
-    var gap = 1u;
-    while gap < count / 3u {
-        gap = 3u * gap + 1u;
-    }
-    while gap > 0u {
-        for (var i = gap; i < count; i++) {
-            let moved = entries[first + i];
-            var j = i;
-            while j >= gap && nearer(moved, entries[first + j - gap]) {
-                entries[first + j] = entries[first + j - gap];
-                j -= gap;
-            }
-            entries[first + j] = moved;
-        }
-        gap /= 3u;
-    }
+    shell_sort(first, count);
 }

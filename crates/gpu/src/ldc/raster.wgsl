@@ -20,21 +20,6 @@ fn rows(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     row_starts[prim] = select(0u, rows.y - rows.x, r.usable);
 }
 
-// The triangle that a row belongs to: the last that starts at or before it.
-fn owner(row: u32) -> u32 {
-    var low = 0u;
-    var high = frame.triangles;
-    while high - low > 1u {
-        let middle = (low + high) / 2u;
-        if row_starts[middle] <= row {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    return low;
-}
-
 // A row of a triangle, and its columns.
 struct Row {
     r: Routed,
@@ -44,7 +29,7 @@ struct Row {
 }
 
 fn row_of(item: u32) -> Row {
-    let prim = owner(item);
+    let prim = owner(item, frame.triangles);
     let r = routed(prim);
     let row = rows_of(r).x + item - row_starts[prim];
     return Row(r, prim, row, columns_of(r, row));

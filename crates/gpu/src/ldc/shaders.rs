@@ -24,7 +24,11 @@ pub(crate) const SCAN: Program = Program {
 
 pub(crate) const SORT: Program = Program {
     name: "sort.wgsl",
-    source: concat!(include_str!("common.wgsl"), include_str!("sort.wgsl")),
+    source: concat!(
+        include_str!("common.wgsl"),
+        include_str!("shell.wgsl"),
+        include_str!("sort.wgsl")
+    ),
 };
 
 pub(crate) const LEVELS: Program = Program {
@@ -68,6 +72,7 @@ pub(crate) const GRID: Program = Program {
     source: concat!(
         include_str!("common.wgsl"),
         include_str!("span.wgsl"),
+        include_str!("shell.wgsl"),
         include_str!("../grid/grid.wgsl"),
     ),
 };

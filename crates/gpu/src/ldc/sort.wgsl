@@ -28,23 +28,7 @@ fn sort(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let first = starts[texel];
     let count = starts[texel + 1u] - first;
-    // Shell sort; insertion sort where lists are short.
-    var gap = 1u;
-    while gap < count / 3u {
-        gap = 3u * gap + 1u;
-    }
-    while gap > 0u {
-        for (var i = gap; i < count; i++) {
-            let moved = load(first + i);
-            var j = i;
-            while j >= gap && before(moved, load(first + j - gap)) {
-                store(first + j, load(first + j - gap));
-                j -= gap;
-            }
-            store(first + j, moved);
-        }
-        gap /= 3u;
-    }
+    shell_sort(first, count);
     if frame.conservative == 1u || count < 2u {
         return;
     }

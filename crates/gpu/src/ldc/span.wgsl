@@ -15,3 +15,18 @@ fn spanned(range: vec2f, a: vec2f, b: vec2f, lines: vec2f) -> vec2f {
     }
     return vec2f(min(range.x, min(u.x, u.y)), max(range.y, max(u.x, u.y)));
 }
+
+// Which of so many a row belongs to: the last whose first row, in `row_starts`, is at or before it.
+fn owner(row: u32, count: u32) -> u32 {
+    var low = 0u;
+    var high = count;
+    while high - low > 1u {
+        let middle = (low + high) / 2u;
+        if row_starts[middle] <= row {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
