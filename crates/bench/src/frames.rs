@@ -1,5 +1,7 @@
 //! Frames of scenes by all contenders: pictures compared, then times.
 
+use std::time::Duration;
+
 use rayward::CasterPolicy;
 use rayward::trace::SimdLevel;
 use serde::Serialize;
@@ -12,6 +14,9 @@ use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, T
 
 /// Share of the pixels in which a picture may differ: rays of f32 peers through edges and along grazing surfaces.
 pub const TOLERATED_SHARE: f64 = 0.005;
+
+/// A frame that takes longer than this is drawn once, to compare it, and that time counts.
+const DEAR: Duration = Duration::from_secs(20);
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -209,10 +214,12 @@ pub(crate) fn measure_frame(
     let mut shadow_rays = 0;
     let mut first: Option<Picture> = None;
     let mut rows: Vec<Row> = Vec::new();
+    let mut times: Vec<Vec<Time>> = Vec::new();
     // This also warms up: caches, and the memory that allocators keep.
     for contender in &contenders {
         let mut picture = Picture::new(width, height, tile_side());
-        let asked = contender.draw(job, &mut picture);
+        let (asked, time) = Stopwatch::time(|| contender.draw(job, &mut picture));
+        times.push(if time.wall > DEAR { vec![time] } else { Vec::new() });
         let name = format!("{}-{}-{}", job.scene.name, job.kind.name(), contender.name());
         pictures(&name, &picture);
         let difference = first
@@ -234,7 +241,7 @@ pub(crate) fn measure_frame(
         });
     }
     let rays = u64::from(width) * u64::from(height) + shadow_rays;
-    time_all(job, &contenders, &mut rows, runs, rays);
+    time_all(job, &contenders, &mut rows, times, runs, rays);
     let best = |ours: bool| {
         let rows = rows.iter().filter(move |row| row.ours == ours);
         let timed = rows.filter_map(|row| Some((row.times?.cpu_ms.median, &row.contender)));
@@ -255,21 +262,28 @@ pub(crate) fn measure_frame(
     }
 }
 
-/// Runs all that draw the same picture in turns, each round beginning with another one.
-fn time_all(job: &Job, contenders: &[&Drawer], rows: &mut [Row], runs: usize, rays: u64) {
+/// Runs all that draw the same picture and have no time yet in turns, each round beginning with another one.
+fn time_all(
+    job: &Job,
+    contenders: &[&Drawer],
+    rows: &mut [Row],
+    mut times: Vec<Vec<Time>>,
+    runs: usize,
+    rays: u64,
+) {
     let mut picture = Picture::new(job.view.width, job.view.height, tile_side());
-    let mut times: Vec<Vec<Time>> = vec![Vec::new(); contenders.len()];
+    let again: Vec<bool> = times.iter().map(Vec::is_empty).collect();
     for round in 0..runs {
         for turn in 0..contenders.len() {
             let i = (round + turn) % contenders.len();
-            if rows[i].same_picture {
+            if rows[i].same_picture && again[i] {
                 let (_, time) = Stopwatch::time(|| contenders[i].draw(job, &mut picture));
                 times[i].push(time);
             }
         }
     }
     for (row, times) in rows.iter_mut().zip(&times) {
-        if !times.is_empty() {
+        if row.same_picture && !times.is_empty() {
             let times = Times::of(times);
             row.mray_per_s = Some(rays as f64 / 1e3 / times.cpu_ms.median);
             row.times = Some(times);

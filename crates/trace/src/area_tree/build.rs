@@ -5,11 +5,15 @@
 //! share a node, sixteen nodes in a row their parent. Size classes keep a large triangle from stretching the boxes of
 //! small neighbours. The bits of depth follow after a fixed number of those of the raster.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use super::frame::{Frame, Local};
 use crate::kernel::area::set_up_group;
+use crate::kernel::light_boxes::{self, Corners, Curve, Sight};
 use crate::kernel::lines::{CornerLanes, Group};
+use crate::kernel::project::RasterVertex;
 use crate::kernel::shaft::Boxes;
 use crate::kernel::{LANES, SimdLevel};
 use crate::light_grid::{CastRule, Casts};
@@ -22,6 +26,8 @@ pub(super) struct Entry {
     /// Twice or four times the triangle's id: bit 0 is set if it is turned with its back to the light, bit 1 if its plane
     /// crosses the light.
     tag: u32,
+    /// Its place on the curve.
+    key: u32,
 }
 
 const BACK: u32 = 1;
@@ -43,47 +49,131 @@ pub(super) fn entries(
     level: SimdLevel,
 ) -> Vec<Entry> {
     let vertices = crate::eye_grid::project_all(level, &frame.view, triangles);
-    let chunks = triangles.len().div_ceil(CHUNK);
-    let chunk = |chunk: usize| {
-        let prims = (chunk * CHUNK) as u32..((chunk + 1) * CHUNK).min(triangles.len()) as u32;
+    let sight = frame.sight(light);
+    let finder = Finder {
+        frame,
+        curve: curve(&sight, &vertices, frame.lanes.reach.is_some()),
+        sight,
+        triangles,
+        vertices: &vertices,
+        rule,
+        level,
+    };
+    let chunks: Vec<Vec<Entry>> = (0..triangles.len().div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| finder.chunk(chunk * CHUNK..((chunk + 1) * CHUNK).min(triangles.len())))
+        .collect();
+    chunks.concat()
+}
+
+/// The curve over all vertices that lie ahead.
+fn curve(sight: &Sight, vertices: &[RasterVertex], parallel: bool) -> Curve {
+    let [scale, unit] = sight.scale;
+    let none = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let range_of = |vertices: &[RasterVertex]| {
+        let (mut low, mut high) = none;
+        for v in vertices {
+            if v.nearness > 0.0 && v.nearness <= sight.limit {
+                let [x, y, nearness] = [v.x * scale, v.y * scale, v.nearness * unit];
+                let share = if parallel { 1.0 } else { 1.0 / (1.0 + x.abs() + y.abs()) };
+                let depth = if parallel { -nearness } else { 1.0 / nearness };
+                for (axis, at) in [x * share, y * share, depth].into_iter().enumerate() {
+                    low[axis] = if at < low[axis] { at } else { low[axis] };
+                    high[axis] = if at > high[axis] { at } else { high[axis] };
+                }
+            }
+        }
+        (low, high)
+    };
+    let (low, high) = vertices.par_chunks(CHUNK).map(range_of).reduce(
+        || none,
+        |(low, high), (l, h)| {
+            let axes = [0, 1, 2];
+            (axes.map(|i| low[i].min(l[i])), axes.map(|i| high[i].max(h[i])))
+        },
+    );
+    let inverse = [0, 1, 2].map(|axis| {
+        let range = high[axis] - low[axis];
+        if range > 0.0 { 1.0 / range } else { 0.0 }
+    });
+    Curve {
+        low,
+        inverse,
+        parallel,
+    }
+}
+
+/// What finds the entries of a frame.
+struct Finder<'f> {
+    frame: &'f Frame,
+    sight: Sight,
+    curve: Curve,
+    triangles: &'f Triangles<'f>,
+    vertices: &'f [RasterVertex],
+    rule: CastRule<'f>,
+    level: SimdLevel,
+}
+
+impl Finder<'_> {
+    fn chunk(&self, prims: Range<usize>) -> Vec<Entry> {
         let mut entries = Vec::with_capacity(prims.len());
-        for prim in prims {
-            let casts = rule(prim);
-            if casts == Casts::Nothing {
-                continue;
+        let (mut corners, mut bounds) = (Corners::default(), [[0.0; LANES]; 6]);
+        for first in prims.clone().step_by(LANES) {
+            let count = (prims.end - first).min(LANES);
+            self.gather(first, count, &mut corners);
+            let seen = light_boxes::look(self.level, &self.sight, &corners, &mut bounds);
+            let mut kept = seen.area & !(seen.apart & seen.ahead) & (u32::MAX >> (32 - count));
+            let mut others = kept & !seen.ahead;
+            while others != 0 {
+                let lane = others.trailing_zeros() as usize;
+                others &= others - 1;
+                match self.frame.bounds(self.triangles, self.vertices, (first + lane) as u32) {
+                    Some(found) => (0..6).for_each(|i| bounds[i][lane] = found[i]),
+                    None => kept &= !(1 << lane),
+                }
             }
-            let Some(bounds) = frame.bounds(triangles, &vertices, prim) else {
-                continue;
-            };
-            if triangles.is_degenerate(prim) {
-                continue;
-            }
-            let side = light.side(triangles.corners(prim));
-            if casts == Casts::Back && side > 0.0 {
-                continue;
-            }
-            let tag = prim << 2;
-            if side > 0.0 {
-                entries.push(Entry { bounds, tag });
-            } else if side < 0.0 {
-                entries.push(Entry {
-                    bounds,
-                    tag: tag | BACK,
-                });
-            } else {
-                entries.push(Entry {
-                    bounds,
-                    tag: tag | CROSSING,
-                });
-                entries.push(Entry {
-                    bounds,
-                    tag: tag | CROSSING | BACK,
-                });
+            let keys = light_boxes::places(self.level, &self.curve, &bounds);
+            while kept != 0 {
+                let lane = kept.trailing_zeros() as usize;
+                kept &= kept - 1;
+                let prim = (first + lane) as u32;
+                let [front, back] = [seen.front, seen.back].map(|bits| bits >> lane & 1 != 0);
+                let casts = (self.rule)(prim);
+                if casts == Casts::Nothing || (casts == Casts::Back && front) {
+                    continue;
+                }
+                let entry = |flags: u32| Entry {
+                    bounds: std::array::from_fn(|i| bounds[i][lane]),
+                    tag: prim << 2 | flags,
+                    key: keys[lane],
+                };
+                if front {
+                    entries.push(entry(0));
+                } else if back {
+                    entries.push(entry(BACK));
+                } else {
+                    entries.extend([entry(CROSSING), entry(CROSSING | BACK)]);
+                }
             }
         }
         entries
-    };
-    (0..chunks).into_par_iter().flat_map_iter(chunk).collect()
+    }
+
+    /// Puts the corners of triangles in a row into lanes.
+    #[inline]
+    fn gather(&self, first: usize, count: usize, out: &mut Corners) {
+        let Triangles { x, y, z, indices } = self.triangles;
+        for (lane, corners) in indices[first..first + count].iter().enumerate() {
+            for (corner, &index) in corners.iter().enumerate() {
+                let index = index as usize;
+                let vertex = &self.vertices[index];
+                let raster = &mut out.raster[corner];
+                (raster[0][lane], raster[1][lane], raster[2][lane]) = (vertex.x, vertex.y, vertex.nearness);
+                let position = &mut out.position[corner];
+                (position[0][lane], position[1][lane], position[2][lane]) = (x[index], y[index], z[index]);
+            }
+        }
+    }
 }
 
 /// A bit for each triangle that has an entry.
@@ -96,13 +186,13 @@ pub(super) fn present(entries: &[Entry], triangles: usize) -> Vec<u64> {
     bits
 }
 
-/// Sorts the entries by the keys, which have at most 30 bits; equal ones stay in order.
-pub(super) fn sort(entries: &[Entry], key: impl Fn(&Entry) -> u32 + Sync) -> Vec<u32> {
+/// The entries by their places on the curve; equal ones stay in order.
+pub(super) fn sort(entries: &[Entry]) -> Vec<u32> {
     const BITS: u32 = 10;
     let mut pairs: Vec<(u32, u32)> = entries
         .par_iter()
         .enumerate()
-        .map(|(i, entry)| (key(entry), i as u32))
+        .map(|(i, entry)| (entry.key, i as u32))
         .collect();
     let mut sorted = vec![(0, 0); pairs.len()];
     for pass in 0..3 {
@@ -125,166 +215,141 @@ pub(super) fn sort(entries: &[Entry], key: impl Fn(&Entry) -> u32 + Sync) -> Vec
     pairs.into_iter().map(|(_, i)| i).collect()
 }
 
-/// Where an entry's bits of depth stand among those of its place in the raster: after this many bits of the latter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Order {
-    pub(super) depth_after: u32,
-}
-
-/// Bits of raster place in each direction, of depth, and of the size class: 30 in all.
-const PLACE_BITS: u32 = 12;
-const DEPTH_BITS: u32 = 3;
-const CLASS_BITS: u32 = 3;
-
-/// Ranges of the entries' middles, mapped, and of their depths.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ranges {
-    low: [f32; 3],
-    high: [f32; 3],
-    parallel: bool,
-}
-
-impl Ranges {
-    pub(super) fn of(entries: &[Entry], parallel: bool) -> Self {
-        let all = Self {
-            low: [f32::INFINITY; 3],
-            high: [f32::NEG_INFINITY; 3],
-            parallel,
-        };
-        entries
-            .par_iter()
-            .fold(
-                || all,
-                |ranges, entry| {
-                    let at = ranges.place(entry);
-                    Self {
-                        low: [0, 1, 2].map(|i| ranges.low[i].min(at[i])),
-                        high: [0, 1, 2].map(|i| ranges.high[i].max(at[i])),
-                        parallel,
-                    }
-                },
-            )
-            .reduce(
-                || all,
-                |a, b| Self {
-                    low: [0, 1, 2].map(|i| a.low[i].min(b.low[i])),
-                    high: [0, 1, 2].map(|i| a.high[i].max(b.high[i])),
-                    parallel,
-                },
-            )
-    }
-
-    /// A raster point on a finite square: perspective space has no border.
-    fn mapped(&self, [x, y]: [f32; 2]) -> [f32; 2] {
-        if self.parallel {
-            return [x, y];
-        }
-        let size = 1.0 + x.abs() + y.abs();
-        [x / size, y / size]
-    }
-
-    /// Mapped middle and depth.
-    fn place(&self, entry: &Entry) -> [f32; 3] {
-        let [x0, x1, y0, y1, nearest, _] = entry.bounds;
-        let [x, y] = self.mapped([(x0 + x1) * 0.5, (y0 + y1) * 0.5]);
-        [x, y, if self.parallel { -nearest } else { 1.0 / nearest }]
-    }
-
-    /// The sort key of an entry.
-    pub(super) fn key(&self, entry: &Entry, order: Order) -> u32 {
-        let at = self.place(entry);
-        let share = |axis: usize, bits: u32| {
-            let range = self.high[axis] - self.low[axis];
-            let share = (at[axis] - self.low[axis]) / range * (1 << bits) as f32;
-            // What is not a number becomes 0.
-            (share as u32).min((1 << bits) - 1)
-        };
-        let [x0, x1, y0, y1, ..] = entry.bounds;
-        let (low, high) = (self.mapped([x0, y0]), self.mapped([x1, y1]));
-        let extent = |axis: usize| (high[axis] - low[axis]) / (self.high[axis] - self.low[axis]);
-        let extent = extent(0).max(extent(1));
-        // 0 for what spans half of the raster, one more for each halving.
-        let class = if extent > 0.0 {
-            (-extent.log2()).clamp(0.0, 7.0) as u32
-        } else {
-            7
-        };
-        let place = spread(share(0, PLACE_BITS)) << 1 | spread(share(1, PLACE_BITS));
-        let depth = share(2, DEPTH_BITS);
-        let below = 2 * PLACE_BITS - order.depth_after;
-        let key = ((place >> below) << DEPTH_BITS | depth) << below | (place & ((1 << below) - 1));
-        class << (2 * PLACE_BITS + DEPTH_BITS) | key
-    }
-}
-
-const _: () = assert!(2 * PLACE_BITS + DEPTH_BITS + CLASS_BITS == 30);
-
-/// Puts a zero before each of the lowest 16 bits.
-fn spread(mut v: u32) -> u32 {
-    v = (v | v << 8) & 0x00ff_00ff;
-    v = (v | v << 4) & 0x0f0f_0f0f;
-    v = (v | v << 2) & 0x3333_3333;
-    (v | v << 1) & 0x5555_5555
-}
-
-/// Boxes of the sorted entries and of their ancestors, up to a root.
-pub(super) fn levels(entries: &[Entry], sorted: &[u32]) -> Vec<Vec<Boxes>> {
-    let leaves = sorted
-        .par_chunks(LANES)
-        .map(|chunk| {
-            let mut boxes = Boxes::default();
-            for (lane, &i) in chunk.iter().enumerate() {
-                boxes.set(lane, entries[i as usize].bounds);
-            }
-            boxes
-        })
-        .collect();
-    let mut levels: Vec<Vec<Boxes>> = vec![leaves];
-    while let Some(last) = levels.last().filter(|last| last.len() > 1) {
-        let parents = last
-            .par_chunks(LANES)
-            .map(|chunk| {
-                let mut boxes = Boxes::default();
-                for (lane, child) in chunk.iter().enumerate() {
-                    boxes.set(lane, child.hull());
-                }
-                boxes
-            })
-            .collect();
-        levels.push(parents);
-    }
-    levels
-}
-
-/// The triangles of the sorted entries as the kernels take them.
-pub(super) fn groups(
+/// The tree over the sorted entries: the boxes of sixteen each and of their ancestors, up to a root, and the triangles of
+/// each sixteen as the kernels take them.
+pub(super) fn tree(
     entries: &[Entry],
     sorted: &[u32],
     triangles: &Triangles,
     local: &Local,
     level: SimdLevel,
-) -> Vec<Group> {
-    let mut groups = vec![Group::default(); sorted.len().div_ceil(LANES)];
-    groups.par_iter_mut().zip(sorted.par_chunks(LANES)).for_each_init(
-        CornerLanes::default,
-        |corners, (group, chunk)| {
-            (group.crossing, group.back) = (0, 0);
-            for (lane, &i) in chunk.iter().enumerate() {
-                let tag = entries[i as usize].tag;
-                let prim = tag >> 2;
-                group.prim[lane] = prim;
-                group.crossing |= u32::from(tag & CROSSING != 0) << lane;
-                group.back |= (tag & BACK) << lane;
-                corners.side[lane] = if tag & BACK != 0 { -1.0 } else { 1.0 };
-                for (corner, at) in triangles.corners(prim).into_iter().enumerate() {
-                    for axis in 0..3 {
-                        corners.v[corner][axis][lane] = at[axis];
+) -> (Vec<Vec<Boxes>>, Vec<Group>) {
+    let sixteen = |corners: &mut CornerLanes, chunk: &[u32]| {
+        let (mut boxes, mut group) = (Boxes::default(), Group::default());
+        for (lane, &i) in chunk.iter().enumerate() {
+            let Entry { bounds, tag, .. } = entries[i as usize];
+            boxes.set(lane, bounds);
+            group.prim[lane] = tag >> 2;
+            group.crossing |= u32::from(tag & CROSSING != 0) << lane;
+            group.back |= (tag & BACK) << lane;
+            corners.side[lane] = if tag & BACK != 0 { -1.0 } else { 1.0 };
+        }
+        // One array after the other, so that what is fetched from memory does not wait for each other.
+        let mut indices = [[0; 3]; LANES];
+        for (indices, &prim) in indices.iter_mut().zip(&group.prim[..chunk.len()]) {
+            *indices = triangles.indices[prim as usize];
+        }
+        for (lane, indices) in indices[..chunk.len()].iter().enumerate() {
+            for (v, &index) in corners.v.iter_mut().zip(indices) {
+                let index = index as usize;
+                v[0][lane] = triangles.x[index];
+                v[1][lane] = triangles.y[index];
+                v[2][lane] = triangles.z[index];
+            }
+        }
+        let unit = local.unit as f32;
+        set_up_group(level, corners, local.origin.to_array(), unit, &local.light, &mut group);
+        (boxes, group)
+    };
+    let (mut leaves, mut groups) = (Vec::new(), Vec::new());
+    sorted
+        .par_chunks(LANES)
+        .map_init(CornerLanes::default, sixteen)
+        .unzip_into_vecs(&mut leaves, &mut groups);
+    (ancestors(leaves), groups)
+}
+
+/// The boxes of leaves and of their ancestors, up to a root.
+fn ancestors(leaves: Vec<Boxes>) -> Vec<Vec<Boxes>> {
+    let parent = |children: &[Boxes]| {
+        let mut boxes = Boxes::default();
+        for (lane, child) in children.iter().enumerate() {
+            boxes.set(lane, child.hull());
+        }
+        boxes
+    };
+    let mut levels = vec![leaves];
+    while let Some(last) = levels.last().filter(|last| last.len() > 1) {
+        let parents = last.par_chunks(LANES).map(parent).collect();
+        levels.push(parents);
+    }
+    levels
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::{bounds, frame};
+    use super::*;
+    use crate::test_meshes::{Mesh, Numbers};
+
+    /// Small, large, crossing, far, without area, and with corners that are no numbers.
+    fn mesh() -> Mesh {
+        let mut mesh = Mesh::soup(5, 300, 0.2, 2.0);
+        let mut numbers = Numbers(11);
+        for i in 0..60 {
+            let [a, b, c] = [numbers.point(), numbers.point(), numbers.point()];
+            let corners = match i % 6 {
+                0 => [a * 3.0, b * 3.0, c * 3.0],
+                1 => [a, b, a],
+                2 => [a, (a + b) * 0.5, b],
+                3 => [a * 1e6, b, c],
+                4 => [a, b * 1e-6 + a, c * 1e-6 + a],
+                _ => [Vec3::new(f32::NAN, a.y, a.z), b, c],
+            };
+            let first = mesh.x.len() as u32;
+            for corner in corners {
+                mesh.x.push(corner.x);
+                mesh.y.push(corner.y);
+                mesh.z.push(corner.z);
+            }
+            mesh.indices.push([first, first + 1, first + 2]);
+        }
+        mesh
+    }
+
+    #[test]
+    fn lanes_find_what_is_found_one_by_one() {
+        let mesh = mesh();
+        let triangles = mesh.triangles();
+        let (min, max) = bounds(&triangles).unwrap();
+        let (u, v) = (Vec3::X * 0.4, Vec3::Z * 0.3);
+        let lights = [
+            AreaLight::rectangle(Vec3::new(0.1, 0.7, 0.2), u, v),
+            AreaLight::sphere(Vec3::new(0.1, 0.3, -0.4), 0.2),
+            AreaLight::sun(Vec3::new(0.3, -1.0, 0.2), 0.02),
+        ];
+        for light in lights {
+            let local = Local::new(&light, min, max);
+            for frame in frame::frames(&light, &local, min, max) {
+                for level in SimdLevel::available() {
+                    let vertices = crate::eye_grid::project_all(level, &frame.view, &triangles);
+                    let rule = |prim: u32| [Casts::Both, Casts::Back, Casts::Nothing][prim as usize % 3];
+                    let found = entries(&frame, &light, &triangles, &rule, level);
+                    let mut expected = Vec::new();
+                    for prim in 0..triangles.len() as u32 {
+                        let side = light.side(triangles.corners(prim));
+                        let casts = rule(prim);
+                        let none = casts == Casts::Nothing || (casts == Casts::Back && side > 0.0);
+                        let Some(bounds) = frame.bounds(&triangles, &vertices, prim) else {
+                            continue;
+                        };
+                        if none || triangles.is_degenerate(prim) {
+                            continue;
+                        }
+                        let flags: &[u32] = match side {
+                            s if s > 0.0 => &[0],
+                            s if s < 0.0 => &[BACK],
+                            _ => &[CROSSING, CROSSING | BACK],
+                        };
+                        expected.extend(flags.iter().map(|flags| (prim << 2 | flags, bounds)));
                     }
+                    let found: Vec<_> = found.iter().map(|entry| (entry.tag, entry.bounds)).collect();
+                    assert_eq!(found, expected, "{light:?}, {}", level.name());
+                    assert!(found.len() > 100);
                 }
             }
-            let unit = local.unit as f32;
-            set_up_group(level, corners, local.origin.to_array(), unit, &local.light, group);
-        },
-    );
-    groups
+        }
+    }
 }

@@ -10,6 +10,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::kernel::light_boxes::Sight;
 use crate::kernel::lines::LightBox;
 use crate::kernel::project::RasterVertex;
 use crate::kernel::shaft::{FAR, FrameLanes};
@@ -221,6 +222,18 @@ impl Frame {
             near: 0.0,
             depth: 0.0,
             reach: None,
+        }
+    }
+
+    /// What the kernels have to know of it.
+    pub(super) fn sight(&self, light: &AreaLight) -> Sight {
+        Sight {
+            scale: self.scale.map(|scale| scale as f32),
+            limit: self.limit,
+            reach: self.reach.map(|reach| reach as f32),
+            center: light.center.as_dvec3(),
+            is_sun: light.is_sun(),
+            half: light.half_box().as_dvec3(),
         }
     }
 

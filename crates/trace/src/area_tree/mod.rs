@@ -30,7 +30,7 @@ use crate::kernel::shaft::Boxes;
 use crate::kernel::{LANES, SimdLevel};
 use crate::light_grid::CastRule;
 use crate::{AreaLight, Light, Receiver, Samples, Topology, Triangles, exact};
-use build::{MOST_TRIANGLES, Order, Ranges};
+use build::MOST_TRIANGLES;
 use frame::{Frame, Local};
 pub use pixels::{SeenTile, TileSamples};
 
@@ -417,11 +417,8 @@ impl Face {
         level: SimdLevel,
     ) -> Self {
         let entries = build::entries(&frame, light, triangles, rule, level);
-        let ranges = Ranges::of(&entries, frame.lanes.reach.is_some());
-        let order = Order { depth_after: 10 };
-        let sorted = build::sort(&entries, |entry| ranges.key(entry, order));
-        let levels = build::levels(&entries, &sorted);
-        let groups = build::groups(&entries, &sorted, triangles, local, level);
+        let sorted = build::sort(&entries);
+        let (levels, groups) = build::tree(&entries, &sorted, triangles, local, level);
         let present = build::present(&entries, triangles.len());
         Self {
             present,

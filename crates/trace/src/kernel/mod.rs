@@ -17,6 +17,7 @@ pub(crate) mod cover;
 pub(crate) mod edges;
 pub(crate) mod facing;
 pub(crate) mod lambert;
+pub(crate) mod light_boxes;
 pub(crate) mod light_points;
 pub(crate) mod light_tree;
 pub(crate) mod lines;

@@ -33,6 +33,22 @@ pub(crate) struct Boxes {
     pub(crate) farthest: [f32; LANES],
 }
 
+/// The smallest of all, halving by halving.
+#[inline]
+fn least(mut v: [f32; LANES]) -> f32 {
+    for half in [8, 4, 2, 1] {
+        for i in 0..half {
+            v[i] = if v[i + half] < v[i] { v[i + half] } else { v[i] };
+        }
+    }
+    v[0]
+}
+
+#[inline]
+fn most(v: [f32; LANES]) -> f32 {
+    -least(v.map(|v| -v))
+}
+
 /// Larger than every coordinate that occurs, small enough to be multiplied.
 pub(crate) const FAR: f32 = 1e30;
 
@@ -51,15 +67,13 @@ impl Default for Boxes {
 impl Boxes {
     /// The box around all of them that are not empty.
     pub(crate) fn hull(&self) -> [f32; 6] {
-        let low = |v: &[f32; LANES]| v.iter().copied().fold(FAR, f32::min);
-        let high = |v: &[f32; LANES]| v.iter().copied().fold(-FAR, f32::max);
         [
-            low(&self.x[0]),
-            high(&self.x[1]),
-            low(&self.y[0]),
-            high(&self.y[1]),
-            high(&self.nearest),
-            low(&self.farthest),
+            least(self.x[0]),
+            most(self.x[1]),
+            least(self.y[0]),
+            most(self.y[1]),
+            most(self.nearest),
+            least(self.farthest),
         ]
     }
 
