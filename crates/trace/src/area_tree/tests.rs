@@ -405,7 +405,8 @@ fn a_sheet_that_hides_the_light_from_some_is_no_sheet_for_others() {
     }
     let mut numbers = Numbers(3);
     let light = AreaLight::rectangle(Vec3::Y * 2.0, Vec3::X * 0.05, Vec3::Z * 0.05);
-    for depth in [0.0, -8.0] {
+    // Receivers that are level have a box whose sides are, so that all of it lies below the sheet.
+    for (depth, jitter) in [(0.0, Vec3::ONE), (-8.0, Vec3::ONE), (-8.0, Vec3::new(1.0, 0.0, 1.0))] {
         // Below the middle of the hole, on the line that goes through it from the light.
         let seeing = Vec3::new(3.3 * (2.0 - depth), depth, 0.0);
         let places = [
@@ -414,7 +415,7 @@ fn a_sheet_that_hides_the_light_from_some_is_no_sheet_for_others() {
             Vec3::new(0.0, 0.5, 0.0),
             seeing,
         ];
-        let place = |i: usize| Receiver::free((places[i / 16] + numbers.point() * 0.02).as_dvec3());
+        let place = |i: usize| Receiver::free((places[i / 16] + numbers.point() * jitter * 0.02).as_dvec3());
         let receivers: Vec<_> = (0..64).map(place).collect();
         let counts = check("hole", &mesh, &receivers, light, 8);
         assert!(counts.tests > 0, "{counts:?}");
@@ -423,6 +424,25 @@ fn a_sheet_that_hides_the_light_from_some_is_no_sheet_for_others() {
         let (samples, mut scratch) = (Samples::new(8, 7), AreaScratch::default());
         tree.visible(&receivers, &[1; 64], &samples, &mut scratch, &mut bits);
         assert!(bits[..48].iter().all(|&b| b == 0) && bits[48..].iter().any(|&b| b != 0));
+    }
+}
+
+#[test]
+fn a_plane_through_the_light_hides_a_part_of_it() {
+    // All lines from the receivers through the light pass inside of one triangle, some of them behind the light.
+    let far = |x: f32, z: f32| Vec3::new(x, 2.0, z) * Vec3::new(100.0, 1.0, 100.0);
+    let mut mesh = Mesh::default();
+    mesh.triangle([far(-1.0, -1.0), far(1.0, -1.0), far(0.0, 1.0)]);
+    let mut numbers = Numbers(5);
+    let place = |_| Receiver::free((Vec3::Z * 3.0 + numbers.point() * 0.02).as_dvec3());
+    let receivers: Vec<_> = (0..64).map(place).collect();
+    let (middle, x, y) = (Vec3::Y * 2.0, Vec3::X * 0.5, Vec3::Y * 0.5);
+    for light in [AreaLight::sphere(middle, 0.5), AreaLight::rectangle(middle, x, y)] {
+        check("through the light", &mesh, &receivers, light, 8);
+        let (brute, samples) = (BruteForce::new(mesh.triangles()), Samples::new(8, 7));
+        let seen = |r: &Receiver| brute.visible_samples(r, &light, &samples, 1)[0].count_ones();
+        let seen: u32 = receivers.iter().map(seen).sum();
+        assert!(seen > 100 && seen < 400, "{light:?}: {seen}");
     }
 }
 
