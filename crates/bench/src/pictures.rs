@@ -43,7 +43,7 @@ const MEASURES: [(Measure, bool, &str); 5] = [
 
 /// Width and height of a picture.
 fn size(quick: bool) -> [u32; 2] {
-    if quick { [48, 30] } else { [480, 300] }
+    if quick { [160, 100] } else { [360, 225] }
 }
 
 /// Pictures of some built-in scenes.

@@ -3,7 +3,8 @@
 //! A triangle has one entry, wherever it reaches, so there is nothing to choose a resolution for. Entries are sorted
 //! by size class, then by the bits of their middle's place in the raster and its depth (a Morton curve); sixteen in a row
 //! share a node, sixteen nodes in a row their parent. Size classes keep a large triangle from stretching the boxes of
-//! small neighbours. The bits of depth follow after a fixed number of those of the raster.
+//! small neighbours. The bits of depth follow after a fixed number of those of the raster ([`crate::kernel::light_boxes`]).
+//! Cost: 120 to 200 ns a triangle, most of it memory: corners anywhere, and the new tree.
 
 use std::ops::Range;
 
@@ -75,7 +76,11 @@ fn curve(sight: &Sight, vertices: &[RasterVertex], parallel: bool) -> Curve {
         for v in vertices {
             if v.nearness > 0.0 && v.nearness <= sight.limit {
                 let [x, y, nearness] = [v.x * scale, v.y * scale, v.nearness * unit];
-                let share = if parallel { 1.0 } else { 1.0 / (1.0 + x.abs() + y.abs()) };
+                let share = if parallel {
+                    1.0
+                } else {
+                    1.0 / (1.0 + x.abs() + y.abs())
+                };
                 let depth = if parallel { -nearness } else { 1.0 / nearness };
                 for (axis, at) in [x * share, y * share, depth].into_iter().enumerate() {
                     low[axis] = if at < low[axis] { at } else { low[axis] };
@@ -127,7 +132,10 @@ impl Finder<'_> {
             while others != 0 {
                 let lane = others.trailing_zeros() as usize;
                 others &= others - 1;
-                match self.frame.bounds(self.triangles, self.vertices, (first + lane) as u32) {
+                match self
+                    .frame
+                    .bounds(self.triangles, self.vertices, (first + lane) as u32)
+                {
                     Some(found) => (0..6).for_each(|i| bounds[i][lane] = found[i]),
                     None => kept &= !(1 << lane),
                 }
@@ -248,7 +256,14 @@ pub(super) fn tree(
             }
         }
         let unit = local.unit as f32;
-        set_up_group(level, corners, local.origin.to_array(), unit, &local.light, &mut group);
+        set_up_group(
+            level,
+            corners,
+            local.origin.to_array(),
+            unit,
+            &local.light,
+            &mut group,
+        );
         (boxes, group)
     };
     let (mut leaves, mut groups) = (Vec::new(), Vec::new());

@@ -13,7 +13,7 @@
 //! Answers: exactly those of [`crate::BruteForce::visible_samples`], bit for bit. Kernels filter with error bounds;
 //! pairs within them are decided by [`crate::exact`].
 //!
-//! Layout: 1.5 KB for sixteen triangles and 0.4 KB for their boxes, some 120 bytes a triangle; 44 more a triangle while
+//! Layout: 1.5 KB for sixteen triangles and 0.4 KB for their boxes, some 120 bytes a triangle; 90 more a triangle while
 //! building. Spheres have six trees, with one sixth of the triangles each and those that reach over. Rebuilt every
 //! frame. Limits: where coordinates pass 1e30, or there are more than 2^30 triangles, each is tested exactly.
 

@@ -406,7 +406,11 @@ fn a_sheet_that_hides_the_light_from_some_is_no_sheet_for_others() {
     let mut numbers = Numbers(3);
     let light = AreaLight::rectangle(Vec3::Y * 2.0, Vec3::X * 0.05, Vec3::Z * 0.05);
     // Receivers that are level have a box whose sides are, so that all of it lies below the sheet.
-    for (depth, jitter) in [(0.0, Vec3::ONE), (-8.0, Vec3::ONE), (-8.0, Vec3::new(1.0, 0.0, 1.0))] {
+    for (depth, jitter) in [
+        (0.0, Vec3::ONE),
+        (-8.0, Vec3::ONE),
+        (-8.0, Vec3::new(1.0, 0.0, 1.0)),
+    ] {
         // Below the middle of the hole, on the line that goes through it from the light.
         let seeing = Vec3::new(3.3 * (2.0 - depth), depth, 0.0);
         let places = [

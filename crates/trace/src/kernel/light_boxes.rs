@@ -64,12 +64,7 @@ pub(crate) fn look(
 }
 
 #[inline(always)]
-fn look_impl<S: Simd>(
-    simd: S,
-    sight: &Sight,
-    corners: &Corners,
-    bounds: &mut [[f32; LANES]; 6],
-) -> Seen {
+fn look_impl<S: Simd>(simd: S, sight: &Sight, corners: &Corners, bounds: &mut [[f32; LANES]; 6]) -> Seen {
     let mut seen = Seen::default();
     for half in 0..2 {
         let [area, front, back] = sides(simd, sight, &corners.position, half);
@@ -146,14 +141,20 @@ fn sides<S: Simd>(simd: S, sight: &Sight, corners: &[[[f32; LANES]; 3]; 3], half
     let size = sum(abs(normal));
     let zero = splat(0.0);
     let area = size.simd_gt(zero) & size.simd_lt(splat(f64::INFINITY));
-    let center = [splat(sight.center.x), splat(sight.center.y), splat(sight.center.z)];
+    let center = [
+        splat(sight.center.x),
+        splat(sight.center.y),
+        splat(sight.center.z),
+    ];
     let from = if sight.is_sun { center } else { minus(center, v0) };
     let half_box = [splat(sight.half.x), splat(sight.half.y), splat(sight.half.z)];
     let middle = dot(normal, from);
     let [x, y, z] = abs(from);
     let reach = sum([x + half_box[0], y + half_box[1], z + half_box[2]]);
     let sizes = sum(abs(a)) * sum(abs(b)) * reach;
-    let certain = middle.abs().simd_gt(dot(abs(normal), half_box) + sizes * splat(1e-12));
+    let certain = middle
+        .abs()
+        .simd_gt(dot(abs(normal), half_box) + sizes * splat(1e-12));
     [
         area.to_bitmask() as u32,
         (certain & middle.simd_gt(zero)).to_bitmask() as u32,
@@ -225,7 +226,11 @@ fn places_impl<S: Simd>(simd: S, curve: &Curve, bounds: &[[f32; LANES]; 6]) -> [
     let half = splat(0.5);
     let middle = mapped(simd, curve, [(x0 + x1) * half, (y0 + y1) * half]);
     let (low, high) = (mapped(simd, curve, [x0, y0]), mapped(simd, curve, [x1, y1]));
-    let depth = if curve.parallel { -nearest } else { splat(1.0) / nearest };
+    let depth = if curve.parallel {
+        -nearest
+    } else {
+        splat(1.0) / nearest
+    };
     let extent = |axis: usize| (high[axis] - low[axis]) * splat(curve.inverse[axis]);
     let extent = extent(0).max(extent(1));
     // 0 for what spans half of the raster, one more for each halving.
@@ -275,7 +280,12 @@ fn share<S: Simd>(simd: S, curve: &Curve, axis: usize, at: f32x16<S>, bits: u32)
 /// Puts a zero before each of the lowest 16 bits.
 #[inline(always)]
 fn spread<S: Simd>(simd: S, mut v: i32x16<S>) -> i32x16<S> {
-    for (shift, mask) in [(8, 0x00ff_00ff), (4, 0x0f0f_0f0f), (2, 0x3333_3333), (1, 0x5555_5555)] {
+    for (shift, mask) in [
+        (8, 0x00ff_00ff),
+        (4, 0x0f0f_0f0f),
+        (2, 0x3333_3333),
+        (1, 0x5555_5555),
+    ] {
         v = (v | (v << shift)) & i32x16::splat(simd, mask);
     }
     v
