@@ -3,9 +3,10 @@
 //! Differences of f32 coordinates and their products are nearly exact in f64, so slivers have their normals, too. Cost: some 35
 //! operations of eight lanes, a square root and a division.
 
-use fearless_simd::{Simd, dispatch, f32x16, f64x8, prelude::*};
+use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 
+use super::doubles::{Three, cross, dot, load, minus};
 use super::{LANES, SimdLevel};
 use crate::Light;
 use crate::view::{Arrangement, View};
@@ -72,14 +73,10 @@ fn facing_impl<S: Simd>(
 }
 
 #[inline(always)]
-fn facing_half<S: Simd>(simd: S, facing: &Facing, [a, b, c]: [[f64x8<S>; 3]; 3]) -> f64x8<S> {
+fn facing_half<S: Simd>(simd: S, facing: &Facing, [a, b, c]: [Three<S>; 3]) -> f64x8<S> {
     let zero = f64x8::splat(simd, 0.0);
     let (u, v) = (minus(b, a), minus(c, a));
-    let normal = [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ];
+    let normal = cross(u, v);
     let length = dot(normal, normal).sqrt();
     let seen = height(simd, &facing.eye, a, normal);
     let light = height(simd, &facing.light, a, normal);
@@ -87,28 +84,9 @@ fn facing_half<S: Simd>(simd: S, facing: &Facing, [a, b, c]: [[f64x8<S>; 3]; 3])
     (length.simd_gt(zero) & value.simd_eq(value)).select(value, zero)
 }
 
-#[inline(always)]
-fn load<S: Simd>(simd: S, v: &[[f32; TRIANGLES]; 3], half: usize) -> [f64x8<S>; 3] {
-    let at = |axis: usize| {
-        let (low, high) = f32x16::from_slice(simd, &v[axis]).widen();
-        if half == 0 { low } else { high }
-    };
-    [at(0), at(1), at(2)]
-}
-
-#[inline(always)]
-fn minus<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> f64x8<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// An end's height over a plane through `from`, times the length of the normal.
 #[inline(always)]
-fn height<S: Simd>(simd: S, end: &End, from: [f64x8<S>; 3], normal: [f64x8<S>; 3]) -> f64x8<S> {
+fn height<S: Simd>(simd: S, end: &End, from: Three<S>, normal: Three<S>) -> f64x8<S> {
     let splat = |v: f64| f64x8::splat(simd, v);
     match *end {
         End::At(p) => dot(minus([splat(p.x), splat(p.y), splat(p.z)], from), normal),

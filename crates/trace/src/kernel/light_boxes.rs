@@ -9,6 +9,7 @@
 use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, prelude::*};
 use glam::DVec3;
 
+use super::doubles::{abs, cross, dot, load, minus, sum};
 use super::shaft::FAR;
 use super::{LANES, SimdLevel, bits_of, max3, min3};
 
@@ -133,11 +134,7 @@ fn sides<S: Simd>(simd: S, sight: &Sight, corners: &[[[f32; LANES]; 3]; 3], half
         load(simd, &corners[2], half),
     );
     let (a, b) = (minus(v1, v0), minus(v2, v0));
-    let normal = [
-        a[1] * b[2] - b[1] * a[2],
-        a[2] * b[0] - b[2] * a[0],
-        a[0] * b[1] - b[0] * a[1],
-    ];
+    let normal = cross(a, b);
     let size = sum(abs(normal));
     let zero = splat(0.0);
     let area = size.simd_gt(zero) & size.simd_lt(splat(f64::INFINITY));
@@ -160,35 +157,6 @@ fn sides<S: Simd>(simd: S, sight: &Sight, corners: &[[[f32; LANES]; 3]; 3], half
         (certain & middle.simd_gt(zero)).to_bitmask() as u32,
         (certain & middle.simd_lt(zero)).to_bitmask() as u32,
     ]
-}
-
-#[inline(always)]
-fn load<S: Simd>(simd: S, v: &[[f32; LANES]; 3], half: usize) -> [f64x8<S>; 3] {
-    let at = |axis: usize| {
-        let (low, high) = f32x16::from_slice(simd, &v[axis]).widen();
-        if half == 0 { low } else { high }
-    };
-    [at(0), at(1), at(2)]
-}
-
-#[inline(always)]
-fn minus<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn abs<S: Simd>(v: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
-    [v[0].abs(), v[1].abs(), v[2].abs()]
-}
-
-#[inline(always)]
-fn sum<S: Simd>(v: [f64x8<S>; 3]) -> f64x8<S> {
-    v[0] + v[1] + v[2]
-}
-
-#[inline(always)]
-fn dot<S: Simd>(a: [f64x8<S>; 3], b: [f64x8<S>; 3]) -> f64x8<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The curve through perspective space along which a tree's triangles are sorted: 12 bits of each direction of the raster

@@ -14,6 +14,7 @@ pub(crate) mod bundles;
 pub(crate) mod casters;
 pub(crate) mod cluster;
 pub(crate) mod cover;
+mod doubles;
 pub(crate) mod edges;
 pub(crate) mod facing;
 pub(crate) mod lambert;
