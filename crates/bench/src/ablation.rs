@@ -9,7 +9,7 @@ use rayward::trace::{Binning, EyeGridOptions, FaceOptions, LightGridOptions, Sim
 use crate::contender::{FrameKind, Job};
 use crate::frames::{Drawer, FramesReport, TOLERATED_SHARE, measure_frame};
 use crate::ours::{LookUp, Rayward, Ways};
-use crate::{BenchScene, Machine, Result};
+use crate::{BenchScene, Machine, Result, workers};
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -24,6 +24,8 @@ pub struct AblationOptions {
     pub runs: usize,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
 }
 
 /// Built-in scenes that are measured unless others are asked for.
@@ -38,11 +40,9 @@ pub fn measure(
     options: &AblationOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<FramesReport> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .build()?;
+    let pool = workers::pool(options.threads, options.pinned)?;
     let mut report = FramesReport {
-        machine: Machine::describe(options.level, options.threads),
+        machine: Machine::describe(options.level, options.threads, options.pinned),
         embree: Vec::new(),
         width: options.width,
         height: options.height,

@@ -29,6 +29,8 @@ pub struct AllOptions {
     pub runs: usize,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
     /// Folder of scenes, with a camera file.
     pub folder: Option<std::path::PathBuf>,
     /// Scenes of frames and builds; unless there are any, the meshes of the folder or else the built-in ones.
@@ -71,6 +73,7 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         threads,
         runs,
         level,
+        pinned,
         ..
     } = options;
     let folder = options.folder.as_deref();
@@ -92,6 +95,7 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         height,
         runs,
         level,
+        pinned,
         ..FramesOptions::default()
     };
     let build = BuildOptions {
@@ -100,12 +104,14 @@ pub fn measure(options: &AllOptions, progress: &mut dyn FnMut(&str)) -> Result<A
         threads,
         runs,
         level,
+        pinned,
     };
     let scaling = ScalingOptions {
         quick,
         threads,
         runs,
         level,
+        pinned,
     };
     let few: &[&str] = if quick { &["blob-1k"] } else { &ablation::SCENES };
     let some = load(few)?;
@@ -131,6 +137,7 @@ fn of_tables(options: &AllOptions) -> TablesOptions {
         threads: options.threads,
         runs: options.runs,
         level: options.level,
+        pinned: options.pinned,
         cubes: if options.quick {
             vec![32, 64]
         } else {
@@ -148,6 +155,7 @@ fn of_ablations(options: &AllOptions) -> AblationOptions {
         threads: 1,
         runs: options.runs,
         level: options.level,
+        pinned: options.pinned,
     }
 }
 
@@ -158,6 +166,7 @@ fn of_structures(options: &AllOptions) -> StructuresOptions {
         runs: options.runs,
         cube: if options.quick { 32 } else { 512 },
         level: options.level,
+        pinned: options.pinned,
         peers: true,
     }
 }

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
 use crate::ours::{Rayward, Ways, eye_grid, tile_side};
-use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch};
+use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch, workers};
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -21,6 +21,8 @@ pub struct BuildOptions {
     pub runs: usize,
     /// Instruction set of the kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
 }
 
 /// Results of all scenes.
@@ -79,10 +81,10 @@ pub fn measure(
     options: &BuildOptions,
     progress: &mut dyn FnMut(&str),
 ) -> Result<BuildReport> {
-    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = |threads| workers::pool(threads, options.pinned);
     let pools = [pool(1)?, pool(options.threads)?];
     let mut report = BuildReport {
-        machine: Machine::describe(options.level, options.threads),
+        machine: Machine::describe(options.level, options.threads, options.pinned),
         runs: options.runs,
         scenes: Vec::new(),
     };

@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::claims::{Claim, Verdict, claim};
 use crate::structures::mirrored_rays;
 use crate::tables::TablesOptions;
-use crate::{BenchScene, Result, Spread, Stopwatch};
+use crate::{BenchScene, Result, Spread, Stopwatch, workers};
 
 /// A row of VMV07's Table 1: its name, thousand triangles, layers, and A and B in milliseconds at 512 and 1024; a
 /// built-in stand-in by the frequency of a blob, and the mesh of the scenes folder.
@@ -123,9 +123,7 @@ pub struct CubeLine {
 /// # Errors
 /// [`crate::Error`], if a scene cannot be read or threads not be started.
 pub(crate) fn table(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<Vec<CubeLine>> {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .build()?;
+    let pool = workers::pool(options.threads, options.pinned)?;
     let mut lines = Vec::new();
     for paper in &TABLE_1 {
         let scene = match (&options.folder, paper.blob) {

@@ -34,6 +34,9 @@ pub enum Error {
     /// Worker threads could not be started.
     #[error("cannot start threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// Worker threads could not be kept to processors of their own.
+    #[error("cannot pin threads: {0}")]
+    Pin(&'static str),
 }
 
 impl From<rayward::scene::Error> for Error {

@@ -10,7 +10,7 @@ use crate::contender::{Contender, FrameKind, Job};
 use crate::embree::{self, Library, Quality};
 use crate::ours::{Rayward, Ways, tile_side};
 use crate::peers::{Obvhs, ObvhsTree, RegularGrid};
-use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, Times};
+use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, Times, workers};
 
 /// Share of the pixels in which a picture may differ: rays of f32 peers through edges and along grazing surfaces.
 pub const TOLERATED_SHARE: f64 = 0.005;
@@ -33,6 +33,8 @@ pub struct FramesOptions {
     pub runs: usize,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
     /// Whether other ray tracers are measured too.
     pub peers: bool,
     /// Whether our own regular grid is among them, ray by ray: slow.
@@ -48,6 +50,7 @@ impl Default for FramesOptions {
             threads: 1,
             runs: 5,
             level: SimdLevel::detect(),
+            pinned: false,
             peers: true,
             regular_grid: false,
         }
@@ -147,11 +150,9 @@ pub fn measure(
     } else {
         Vec::new()
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
-        .build()?;
+    let pool = workers::pool(options.threads, options.pinned)?;
     let mut report = FramesReport {
-        machine: Machine::describe(options.level, options.threads),
+        machine: Machine::describe(options.level, options.threads, options.pinned),
         embree: libraries.iter().map(Library::description).collect(),
         width: options.width,
         height: options.height,

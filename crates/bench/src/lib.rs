@@ -44,6 +44,7 @@ pub mod steps;
 pub mod structures;
 pub mod table;
 pub mod tables;
+mod workers;
 
 pub use clock::{Stopwatch, Time};
 pub use contender::FrameKind;

@@ -16,6 +16,8 @@ pub struct Machine {
     pub simd: String,
     /// Worker threads of the measurements.
     pub threads: usize,
+    /// Whether each of them keeps to a processor of its own.
+    pub pinned: bool,
     /// Version of Rayward.
     pub rayward: String,
     /// Load of the system over the last minute before the measurements, where it tells: above 0 something else ran.
@@ -24,13 +26,14 @@ pub struct Machine {
 
 impl Machine {
     /// This machine, measured with that many threads.
-    pub fn describe(level: SimdLevel, threads: usize) -> Self {
+    pub fn describe(level: SimdLevel, threads: usize, pinned: bool) -> Self {
         Self {
             processor: processor().unwrap_or_else(|| "unknown".into()),
             processors: std::thread::available_parallelism().map_or(1, usize::from),
             system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),
             simd: level.name().into(),
             threads,
+            pinned,
             rayward: env!("CARGO_PKG_VERSION").into(),
             load: load(),
         }

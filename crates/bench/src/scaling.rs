@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::contender::{Contender, FrameKind, Job};
 use crate::ours::{Rayward, Ways, tile_side};
-use crate::{BenchScene, Machine, Picture, Result, Stopwatch, Times};
+use crate::{BenchScene, Machine, Picture, Result, Stopwatch, Times, workers};
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -24,6 +24,8 @@ pub struct ScalingOptions {
     pub runs: usize,
     /// Instruction set of the kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
 }
 
 /// All curves.
@@ -161,7 +163,7 @@ pub fn measure(options: &ScalingOptions, progress: &mut dyn FnMut(&str)) -> Resu
         progress,
     )?);
     Ok(ScalingReport {
-        machine: Machine::describe(options.level, options.threads),
+        machine: Machine::describe(options.level, options.threads, options.pinned),
         runs: options.runs,
         curves,
     })
@@ -226,7 +228,7 @@ fn one_thread(options: &ScalingOptions, job: &Job, value: f64, lights: usize) ->
 
 fn point(options: &ScalingOptions, job: &Job, threads: usize, value: f64, lights: usize) -> Result<Point> {
     let ours = Rayward::new(Ways::usual());
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let pool = workers::pool(threads, options.pinned)?;
     let lights = job.scene.lights_around(lights);
     let (width, height) = (job.view.width, job.view.height);
     let mut picture = Picture::new(width, height, tile_side());

@@ -94,12 +94,14 @@ pub fn machine(machine: &Machine) -> String {
         system,
         simd,
         threads,
+        pinned,
         rayward,
         load,
     } = machine;
     let load = load.map_or(String::new(), |load| format!(", load {load} before"));
+    let pinned = if *pinned { ", pinned" } else { "" };
     format!(
-        "rayward {rayward} with {simd} on {threads} of {processors} processors, {processor}, {system}{load}\n"
+        "rayward {rayward} with {simd} on {threads} of {processors} processors{pinned}, {processor}, {system}{load}\n"
     )
 }
 

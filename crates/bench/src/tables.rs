@@ -13,7 +13,7 @@ use crate::frames::{self, FrameReport, FramesOptions, Row};
 use crate::ours::{Rayward, Ways, eye_grid, tile_side};
 use crate::papers::{TABLE_1, TABLE_4, TABLES_2_3};
 use crate::steps::{self, StepReport};
-use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch};
+use crate::{BenchScene, Machine, Picture, Result, Spread, Stopwatch, workers};
 
 /// What is measured.
 #[derive(Clone, Debug)]
@@ -26,6 +26,8 @@ pub struct TablesOptions {
     pub runs: usize,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
     /// Texels along the longest side of the layered depth cubes.
     pub cubes: Vec<u32>,
     /// Folder of scenes, with a camera file.
@@ -129,7 +131,7 @@ pub struct RasterLine {
 /// # Errors
 /// [`crate::Error`], if a scene cannot be read or threads not be started.
 pub fn measure(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<TablesReport> {
-    let machine = Machine::describe(options.level, options.threads);
+    let machine = Machine::describe(options.level, options.threads, options.pinned);
     let frames = table_1(options, progress)?;
     let peers = tables_2_3(options, progress)?;
     progress("Table 4");
@@ -159,7 +161,7 @@ pub fn measure(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Resul
 }
 
 fn table_1(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result<Vec<FrameLine>> {
-    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = |threads| workers::pool(threads, options.pinned);
     let (one, all) = (pool(1)?, pool(options.threads)?);
     let ours = Rayward::new(Ways::usual());
     let mut lines = Vec::new();
@@ -236,6 +238,7 @@ fn tables_2_3(options: &TablesOptions, progress: &mut dyn FnMut(&str)) -> Result
         threads: 1,
         runs: options.runs,
         level: options.level,
+        pinned: options.pinned,
         peers: true,
         regular_grid: true,
     };
@@ -297,7 +300,7 @@ fn table_4(options: &TablesOptions) -> Result<RasterLine> {
         "blob-69k"
     };
     let mut scene = BenchScene::load(name, options.folder.as_deref())?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let pool = workers::pool(1, options.pinned)?;
     let ours = Rayward::new(Ways::usual());
     let mut picture = Picture::new(side, side, tile_side());
     let covered = |scene: &BenchScene| -> Result<f64> {

@@ -187,6 +187,9 @@ struct RunArgs {
     /// Runs of each measurement
     #[arg(long, value_name = "NUMBER", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     runs: u32,
+    /// Keep each worker thread on a processor of its own
+    #[arg(long)]
+    pin: bool,
     /// One JSON object on standard output
     #[arg(long)]
     json: bool,

@@ -20,7 +20,7 @@ use rayward::trace::SimdLevel;
 use serde::Serialize;
 
 use crate::embree;
-use crate::{BenchScene, Machine, Result, Spread, Stopwatch};
+use crate::{BenchScene, Machine, Result, Spread, Stopwatch, workers};
 pub use rays::RayClass;
 pub(crate) use rays::mirrored_rays;
 use rays::{Answer, RaySet};
@@ -46,6 +46,8 @@ pub struct StructuresOptions {
     pub cube: u32,
     /// Instruction set of our kernels.
     pub level: SimdLevel,
+    /// Whether each worker thread keeps to a processor of its own.
+    pub pinned: bool,
     /// Whether other libraries are measured too.
     pub peers: bool,
 }
@@ -147,9 +149,9 @@ pub fn measure(
     } else {
         Vec::new()
     };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let pool = workers::pool(1, options.pinned)?;
     let mut report = StructuresReport {
-        machine: Machine::describe(options.level, 1),
+        machine: Machine::describe(options.level, 1, options.pinned),
         runs: options.runs,
         tolerated_share: TOLERATED_SHARE,
         scenes: Vec::new(),

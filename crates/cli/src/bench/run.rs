@@ -56,6 +56,7 @@ fn run_frames(args: &FramesArgs) -> Result<(), Failure> {
         threads: args.threads as usize,
         runs: args.run.run.runs as usize,
         peers: !args.no_peers,
+        pinned: args.run.run.pin,
         ..FramesOptions::default()
     };
     let scenes = load(&args.scenes, &args.run)?;
@@ -90,6 +91,7 @@ fn run_scaling(args: &ScalingArgs) -> Result<(), Failure> {
         threads: args.threads.map_or_else(cores, |threads| threads as usize),
         runs: args.run.run.runs as usize,
         level: SimdLevel::detect(),
+        pinned: args.run.run.pin,
     };
     let measured = scaling::measure(&options, &mut |what| args.run.run.progress(what))?;
     tell(
@@ -108,6 +110,7 @@ fn run_build(args: &BuildArgs) -> Result<(), Failure> {
         threads: args.threads as usize,
         runs: args.run.run.runs as usize,
         level: SimdLevel::detect(),
+        pinned: args.run.run.pin,
     };
     let scenes = load(&args.scenes, &args.run)?;
     let measured = build::measure(&scenes, &options, &mut |what| args.run.run.progress(what))?;
@@ -126,6 +129,7 @@ fn run_tables(args: &TablesArgs) -> Result<(), Failure> {
         threads: args.threads.map_or_else(cores, |threads| threads as usize),
         runs: args.run.run.runs as usize,
         level: SimdLevel::detect(),
+        pinned: args.run.run.pin,
         cubes: args.cubes.clone(),
         folder: folder(),
     };
@@ -146,6 +150,7 @@ fn run_ablation(args: &AblationArgs) -> Result<(), Failure> {
         threads: args.threads as usize,
         runs: args.run.run.runs as usize,
         level: SimdLevel::detect(),
+        pinned: args.run.run.pin,
     };
     let scenes = load_or(&args.scenes, &ablation::SCENES, &args.run)?;
     let measured = ablation::measure(&scenes, &options, &mut |what| args.run.run.progress(what))?;
@@ -166,6 +171,7 @@ fn run_structures(args: &StructuresArgs) -> Result<(), Failure> {
         runs: args.run.run.runs as usize,
         cube: args.cube,
         level: SimdLevel::detect(),
+        pinned: args.run.run.pin,
         peers: !args.no_peers,
     };
     let scenes = load_or(&args.scenes, &ablation::SCENES, &args.run)?;
@@ -193,6 +199,7 @@ fn run_all(args: &AllArgs) -> Result<(), Failure> {
         threads: args.threads.map_or_else(cores, |threads| threads as usize),
         runs: args.run.runs as usize,
         level: SimdLevel::detect(),
+        pinned: args.run.pin,
         folder: folder(),
         scenes: args.scenes.clone(),
     };
