@@ -26,7 +26,10 @@ use crate::{ShadingLight, Surface};
 
 /// An arrival's surface as lights are seen by it: that of a mirror on the way of a diffuse ray reflects none.
 fn lit_surface(arrival: &Arrival) -> Surface {
-    let surface = arrival.surface;
+    let mut surface = arrival.surface;
+    if arrival.diffused && surface.coat.roughness < lobes::SMOOTH {
+        surface.coat.reflectance = 0.0;
+    }
     if !(arrival.diffused && lobes::is_smooth(&surface)) {
         return surface;
     }
@@ -110,17 +113,27 @@ impl TileShader<'_> {
                 self.reflected_rays(surface, arrival.sharp),
                 self.diffused_rays(surface, arrival.sharp),
             ];
+            let coat = surface.coated().map(|coat| {
+                let traced = Traced {
+                    reflection: traced.coat,
+                    ..Traced::default()
+                };
+                (coat, traced, [self.reflected_rays(&coat, arrival.sharp), 0])
+            });
             let directions = self.directions(arrival.sharp);
             for i in 0..directions {
                 let random = self.draw(arrival.path, SURROUNDING, self.sample * directions + i);
                 let sample = environment.sample(random);
                 let towards = sample.towards;
-                let cos = surface.normal.dot(towards);
-                if cos <= 0.0 || surface.geometric_normal.dot(towards) <= 0.0 {
+                if surface.geometric_normal.dot(towards) <= 0.0 {
                     continue;
                 }
                 let drawn = directions as f32 * sample.density;
-                let lit = lobes_lit(surface, towards, traced, rays, drawn) * (cos / drawn) * sample.radiance;
+                let mut lit = lobes_lit(surface, towards, traced, rays, drawn);
+                if let Some((coat, traced, rays)) = &coat {
+                    lit += lobes_lit(coat, towards, *traced, *rays, drawn);
+                }
+                lit *= sample.radiance;
                 if lit.max_element() <= 0.0 {
                     continue;
                 }
@@ -194,9 +207,13 @@ impl TileShader<'_> {
     }
 }
 
-/// The reflection model, each lobe with the share that drawn directions have of its light. Reflection and diffusion draw
-/// as many rays as given.
+/// The reflection model times the cosine over the density drawn with, each lobe with the share that drawn directions have of
+/// its light. Reflection and diffusion draw as many rays as given.
 fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], drawn: f32) -> Vec3 {
+    let cos = surface.normal.dot(towards);
+    if cos <= 0.0 {
+        return Vec3::ZERO;
+    }
     let density = |traced: bool, density: fn(&Surface, Vec3) -> f32, rays: u32| {
         if traced {
             rays as f32 * density(surface, towards)
@@ -210,5 +227,5 @@ fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], d
         let reflected = density(traced.reflection, lobes::reflection_density, rays[0]);
         lit += brdf::specular(surface, towards) * (drawn / (drawn + reflected));
     }
-    lit
+    lit * (cos / drawn)
 }

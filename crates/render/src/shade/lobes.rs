@@ -112,7 +112,7 @@ pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
     };
     Some(Lobe {
         towards: above(towards, -surface.geometric_normal),
-        weight: surface.base_color * passed * (through * shadowed),
+        weight: surface.base_color * passed * (through * shadowed * surface.coat.passed),
         density: f32::INFINITY,
     })
 }

@@ -12,6 +12,7 @@
 //! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
 
 pub mod brdf;
+mod coat;
 mod light;
 pub mod lobes;
 mod surface;
@@ -19,6 +20,7 @@ mod surface;
 use glam::Vec3;
 use rayward_trace::{AreaLight, Light};
 
+pub use coat::Coat;
 pub use light::{Incident, ShadingLight};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
 
@@ -49,11 +51,18 @@ pub fn direct_from(
 
 #[inline]
 fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
-    let cos_shading = surface.normal.dot(incident.towards);
-    if cos_shading <= 0.0 || surface.geometric_normal.dot(incident.towards) <= 0.0 {
+    let towards = incident.towards;
+    let cos = surface.normal.dot(towards);
+    let coat = surface.coated().map(|coat| (coat, coat.normal.dot(towards)));
+    let faces = cos > 0.0 || coat.is_some_and(|(_, cos)| cos > 0.0);
+    if !faces || surface.geometric_normal.dot(towards) <= 0.0 {
         return None;
     }
-    incident.radiance *= brdf::evaluate(surface, incident.towards) * cos_shading;
+    let mut sent = brdf::evaluate(surface, towards) * cos.max(0.0);
+    if let Some((coat, cos)) = coat {
+        sent += brdf::specular(&coat, towards) * cos.max(0.0);
+    }
+    incident.radiance *= sent;
     Some(incident)
 }
 
@@ -66,6 +75,8 @@ pub struct Traced {
     pub transmission: bool,
     /// Diffuse light.
     pub diffusion: bool,
+    /// Reflection of the coat.
+    pub coat: bool,
 }
 
 /// Radiance that does not come from a light: emission, and the reflection of a surrounding that has the radiance
@@ -87,12 +98,18 @@ pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
         dielectric * surface.transmission,
         dielectric * (1.0 - surface.transmission),
     );
-    let left = if traced == Traced::default() {
+    let below = Traced {
+        coat: false,
+        ..traced
+    };
+    let left = if below == Traced::default() {
         1.0
     } else {
         share(traced.reflection, surface.metallic)
             + share(traced.transmission, through)
             + share(traced.diffusion, back)
     };
-    surface.emissive + surrounding * surface.base_color * (surface.occlusion * left)
+    let coat = Vec3::splat(share(traced.coat, surface.coat.reflectance));
+    let around = surrounding * surface.base_color * (surface.occlusion * left);
+    (surface.emissive + around) * surface.coat.passed + surrounding * coat * surface.occlusion
 }
