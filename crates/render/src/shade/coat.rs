@@ -14,6 +14,7 @@ use glam::Vec3;
 
 use super::Surface;
 use super::brdf::schlick;
+use super::lobes::seen_normal;
 
 /// Reflectance of a coat seen head on: that of an index of refraction of 1.5.
 const HEAD_ON: f32 = 0.04;
@@ -40,9 +41,10 @@ impl Coat {
         normal: Vec3::Z,
     };
 
-    /// A coat that covers a share of the surface, seen from a direction.
-    pub(super) fn new(factor: f32, roughness: f32, normal: Vec3, view: Vec3) -> Self {
-        let reflectance = factor * (HEAD_ON + (1.0 - HEAD_ON) * schlick(normal.dot(view)));
+    /// A coat that covers a share of the surface, with its normal and the geometric one, seen from a direction.
+    pub(super) fn new(factor: f32, roughness: f32, [normal, geometric]: [Vec3; 2], view: Vec3) -> Self {
+        let cos = seen_normal([normal, geometric], view).dot(view);
+        let reflectance = factor * (HEAD_ON + (1.0 - HEAD_ON) * schlick(cos));
         Self {
             reflectance,
             passed: 1.0 - reflectance,

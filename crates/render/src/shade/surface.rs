@@ -448,7 +448,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             unlit: material.unlit,
             front,
-            coat: coat(&material.coat, &lookup, point.view, normal),
+            coat: coat(&material.coat, &lookup, [point.view, geometric_normal], normal),
         }
     }
 
@@ -483,7 +483,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0,
             unlit: material.unlit,
             front: crossing.enters,
-            coat: Coat::new(material.coat.factor, material.coat.roughness, normal, view),
+            coat: Coat::new(material.coat.factor, material.coat.roughness, [normal; 2], view),
         }
     }
 
@@ -532,7 +532,7 @@ fn base_color(
 fn coat(
     coat: &ShaderCoat,
     lookup: &Lookup,
-    view: Vec3,
+    [view, geometric]: [Vec3; 2],
     normal: impl Fn((&Option<Texture>, f32)) -> Vec3,
 ) -> Coat {
     if coat.factor == 0.0 {
@@ -543,7 +543,7 @@ fn coat(
     Coat::new(
         coat.factor * factor,
         coat.roughness * roughness,
-        normal((&coat.normal_texture, coat.normal_scale)),
+        [normal((&coat.normal_texture, coat.normal_scale)), geometric],
         view,
     )
 }
