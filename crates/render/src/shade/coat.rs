@@ -58,7 +58,10 @@ impl Surface {
     /// The coat alone, as a white mirror of its own; `None` without one.
     #[inline]
     pub fn coated(&self) -> Option<Self> {
-        (self.coat.reflectance > 0.0).then(|| Self {
+        if self.coat.reflectance <= 0.0 {
+            return None;
+        }
+        Some(Self {
             normal: self.coat.normal,
             base_color: Vec3::ZERO,
             metallic: 0.0,
