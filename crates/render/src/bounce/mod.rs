@@ -80,6 +80,8 @@ struct Flight {
     diffuse: bool,
     /// Whether it or one before it was such.
     diffused: bool,
+    /// Whether it sees lights with a size.
+    shows_lights: bool,
     cone: Cone,
     path: Path,
 }
@@ -111,6 +113,8 @@ pub(crate) struct Arrival {
     sharp: f32,
     /// Whether a diffuse ray is on the path.
     diffused: bool,
+    /// Whether the last ray of the path sees lights with a size.
+    shows_lights: bool,
     surface: Surface,
     receiver: Receiver,
     on: OnSolid,
@@ -235,6 +239,7 @@ impl TileShader<'_> {
             weight: Vec3::splat(point.weight),
             sharp: 1.0,
             diffused: false,
+            shows_lights: false,
             surface: point.surface,
             receiver: point.receiver,
             on: point.on,
@@ -278,7 +283,13 @@ impl TileShader<'_> {
             }
             for (flight, hit) in work.flights.iter().zip(&work.hits) {
                 let end = hit.map_or(f64::INFINITY, |(_, hit)| hit.t);
-                if let Some(solid) = self.solid_before(flight, end) {
+                let solid = self.solid_before(flight, end);
+                let nearest = solid.map_or(end, |(_, crossing)| crossing.t);
+                let lights = self.lights_along(flight, nearest as f32);
+                if lights != Vec3::ZERO {
+                    add(out, flight.pixel, flight.weight * lights);
+                }
+                if let Some(solid) = solid {
                     self.arrive_on_solid(flight, &solid, &mut work.arrivals);
                     continue;
                 }
@@ -344,6 +355,7 @@ impl TileShader<'_> {
                 weight: weight * surface.alpha,
                 sharp: flight.sharp,
                 diffused: flight.diffused,
+                shows_lights: flight.shows_lights,
                 receiver,
                 on: None,
                 bounces: flight.bounces,
@@ -386,6 +398,7 @@ impl TileShader<'_> {
             weight: flight.weight * absorbed(inside, distance),
             sharp: flight.sharp,
             diffused: flight.diffused,
+            shows_lights: flight.shows_lights,
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,
@@ -479,6 +492,11 @@ impl TileShader<'_> {
             Some(_) => self.directions(arrival.sharp) as f32,
         };
         let smooth = purpose != DIFFUSED && lobes::is_smooth(surface);
+        let shows_lights = match purpose {
+            DIFFUSED => false,
+            TRANSMITTED => !surface.thin || arrival.shows_lights,
+            _ => light::shows_lights(surface),
+        } && !self.options.paper;
         let diffuse = purpose == DIFFUSED || (purpose != TRANSMITTED && surface.roughness > GLOSSY);
         for i in 0..rays {
             let k = self.sample * rays + i;
@@ -515,6 +533,7 @@ impl TileShader<'_> {
                 absorption,
                 diffuse,
                 diffused: diffuse || arrival.diffused,
+                shows_lights: shows_lights && !arrival.diffused,
                 cone: Cone {
                     spread: arrival.cone.spread.max(spread),
                     ..arrival.cone

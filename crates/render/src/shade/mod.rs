@@ -31,7 +31,7 @@ pub fn direct(surface: &Surface, light: &ShadingLight) -> Option<Incident> {
     if surface.unlit {
         return None;
     }
-    reflected(surface, light.incident(surface.position)?)
+    reflected(surface, light.incident(surface.position)?, &[1.0; 2])
 }
 
 /// As [`direct`], for a sample of a light with a size: what the surface would send if the whole light were like the
@@ -43,14 +43,57 @@ pub fn direct_from(
     area: &AreaLight,
     sample: &Light,
 ) -> Option<Incident> {
+    direct_beside(surface, light, area, sample, &LightRays::default())
+}
+
+/// As [`direct_from`], where rays that the reflections draw meet the light, too: each way counts by its share of the
+/// densities (the balance heuristic of Veach and Guibas 1995).
+#[inline]
+pub(crate) fn direct_beside(
+    surface: &Surface,
+    light: &ShadingLight,
+    area: &AreaLight,
+    sample: &Light,
+    rays: &LightRays,
+) -> Option<Incident> {
     if surface.unlit {
         return None;
     }
-    reflected(surface, light.incident_from(area, sample, surface.position)?)
+    let incident = light.incident_from(area, sample, surface.position)?;
+    if rays.drawn == [0; 2] {
+        return reflected(surface, incident, &[1.0; 2]);
+    }
+    let density = area.met(surface.position.as_dvec3(), incident.towards).0 * rays.samples as f32;
+    let share = |mirror: &Surface, drawn: u32| {
+        if drawn == 0 {
+            return 1.0;
+        }
+        if lobes::is_smooth(mirror) {
+            return 0.0;
+        }
+        let other = drawn as f32 * lobes::reflection_density(mirror, incident.towards);
+        if density > 0.0 {
+            density / (density + other)
+        } else {
+            1.0
+        }
+    };
+    let coat = surface.coated().map_or(1.0, |coat| share(&coat, rays.drawn[1]));
+    reflected(surface, incident, &[share(surface, rays.drawn[0]), coat])
 }
 
+/// Rays of a surface's reflections that see lights with a size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LightRays {
+    /// Samples that the surface has of a light.
+    pub(crate) samples: u32,
+    /// Rays of its own reflection, and of its coat's.
+    pub(crate) drawn: [u32; 2],
+}
+
+/// What a surface reflects of the light that arrives, its own and its coat's highlights by these shares.
 #[inline]
-fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
+fn reflected(surface: &Surface, mut incident: Incident, shares: &[f32; 2]) -> Option<Incident> {
     let towards = incident.towards;
     let cos = surface.normal.dot(towards);
     let coat = surface.coated().map(|coat| (coat, coat.normal.dot(towards)));
@@ -58,9 +101,10 @@ fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
     if !faces || surface.geometric_normal.dot(towards) <= 0.0 {
         return None;
     }
-    let mut sent = brdf::evaluate(surface, towards) * cos.max(0.0);
+    let highlight = brdf::specular(surface, towards) * shares[0];
+    let mut sent = (brdf::diffuse(surface, towards) + highlight) * cos.max(0.0);
     if let Some((coat, cos)) = coat {
-        sent += brdf::specular(&coat, towards) * cos.max(0.0);
+        sent += brdf::specular(&coat, towards) * (cos.max(0.0) * shares[1]);
     }
     incident.radiance *= sent;
     Some(incident)
