@@ -186,7 +186,10 @@ fn cheapest(costs: &ShadowCosts, one_surface: bool) -> ShadowStructure {
 
 /// Whether a material may reflect or transmit along rays.
 fn sends_rays(material: &Material) -> bool {
-    let may_be_glossy = material.roughness <= GLOSSY || material.metallic_roughness_texture.is_some();
+    let coat = &material.coat;
+    let may_be_glossy = material.roughness <= GLOSSY
+        || material.metallic_roughness_texture.is_some()
+        || (coat.factor > 0.0 && (coat.roughness <= GLOSSY || coat.roughness_texture.is_some()));
     !material.unlit && (may_be_glossy || material.transmission > 0.0)
 }
 

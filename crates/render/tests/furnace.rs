@@ -1,7 +1,7 @@
 //! Energy: what a surface reflects under a sky of radiance 1 is its albedo, known in closed form or bounded.
 
 use glam::{DVec3, Vec3};
-use rayward::shade::{brdf, lobes};
+use rayward::shade::{Coat, brdf, lobes};
 use rayward::{ShadingLight, Surface, shade};
 use rayward_scene::{LightKind, PosedLight};
 
@@ -26,6 +26,7 @@ fn surface(angle: f32, metallic: f32, roughness: f32) -> Surface {
         occlusion: 1.0,
         unlit: false,
         front: true,
+        coat: Coat::NONE,
     }
 }
 

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec3, Vec4};
-use rayward::scene::{FrameGeometry, LightKind, Material, PosedCamera, PosedLight, Scene, builtin};
+use rayward::scene::{Coat, FrameGeometry, LightKind, Material, PosedCamera, PosedLight, Scene, builtin};
 use rayward::trace::SimdLevel;
 use rayward::{Environment, Film, Picture, RenderOptions, Renderer, Shader};
 
@@ -191,6 +191,39 @@ fn mirrors_and_clear_glass_vanish_in_an_even_sky() {
         let film = render(&scene, Some(sky(|_, _| Vec3::ONE)), &options, false);
         // What is left out: rays of less than a 4096th of a pixel.
         assert!(off_by(&film) < 0.02, "{}", off_by(&film));
+    }
+}
+
+#[test]
+fn a_coat_on_black_is_the_mirror_of_a_black_dielectric() {
+    let black = Material {
+        base_color: Vec4::new(0.0, 0.0, 0.0, 1.0),
+        ..Material::default()
+    };
+    let mirror = Material {
+        roughness: 0.0,
+        ..black.clone()
+    };
+    let coated = Material {
+        specular: 0.0,
+        coat: Coat {
+            factor: 1.0,
+            ..Coat::default()
+        },
+        ..black
+    };
+    for bounces in [0, 3] {
+        let options = RenderOptions { bounces, ..options() };
+        let show = |material: &Material| {
+            let sky = Some(sky(bright_corner));
+            render(&all_of(material.clone()), sky, &options, false)
+        };
+        let (mirror, coat) = (show(&mirror), show(&coated));
+        let off = mirror.color.iter().zip(&coat.color).map(|(a, b)| (*a - *b).abs());
+        let off = off.fold(0.0, |most: f32, off| most.max(off.max_element()));
+        assert!(off < 1e-4, "{off} after {bounces}");
+        let lit = mirror.color.iter().filter(|color| color.max_element() > 0.1);
+        assert!(lit.count() > 20, "there is something to see");
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use rayward::shade::{self, object_of};
 use rayward::{Shader, ShadingLight, Surface, SurfacePoint};
 use rayward_scene::{
-    AlphaMode, FrameGeometry, Image, LightKind, Material, ObjectRange, PosedLight, Sampler, Scene,
+    AlphaMode, Coat, FrameGeometry, Image, LightKind, Material, ObjectRange, PosedLight, Sampler, Scene,
     TextureRef, TextureTransform, VertexAttributes,
 };
 
@@ -205,6 +205,99 @@ fn specular_and_ior_change_the_dielectric_only() {
             ..metal
         })
     );
+}
+
+/// `KHR_materials_clearcoat` as its text has it, in double precision: a GGX lobe with height-correlated Smith visibility
+/// over what is below, mixed by Schlick's reflectance towards the viewer.
+fn coated(below: f64, [factor, roughness]: [f64; 2], [normal, view, light]: [DVec3; 3]) -> f64 {
+    let half = (view + light).normalize();
+    let (nl, nv, nh) = (normal.dot(light), normal.dot(view), normal.dot(half));
+    let a2 = roughness.powi(4);
+    let d = a2 / (std::f64::consts::PI * (nh * nh * (a2 - 1.0) + 1.0).powi(2));
+    let smith = |this: f64, other: f64| this * (other * other * (1.0 - a2) + a2).sqrt();
+    let v = 0.5 / (smith(nl, nv) + smith(nv, nl));
+    let weight = factor * (0.04 + 0.96 * (1.0 - nv).powi(5));
+    below * (1.0 - weight) + weight * d * v * nl
+}
+
+#[test]
+fn coats_agree_with_the_extension() {
+    let normal_map = |texel| Image {
+        name: "bent".into(),
+        ..one_texel(texel)
+    };
+    for (angles, factor, roughness, metallic) in [
+        ([0.0, 0.0, 0.0], 1.0, 0.5, 0.0),
+        ([30.0, 35.0, 170.0], 1.0, 0.3, 1.0),
+        ([60.0, 75.0, 175.0], 0.5, 0.6, 0.3),
+        ([80.0, 70.0, 180.0], 0.8, 1.0, 0.0),
+        ([50.0, 50.0, 20.0], 1.0, 0.8, 1.0),
+    ] {
+        let [view, light] = [direction(angles[0], 0.0), direction(angles[1], angles[2])];
+        let below = Material {
+            base_color: Vec4::new(0.8, 0.5, 0.2, 1.0),
+            metallic,
+            roughness: 0.4,
+            emissive: Vec3::new(0.0, 3.0, 0.0),
+            ..Material::default()
+        };
+        let lit = |material: Material| {
+            let (mut scene, geometry) = triangle(material);
+            // Factor 0.6 and roughness 0.8, then two normal maps.
+            scene.images = vec![
+                one_texel([153, 204, 0, 255]),
+                normal_map([128, 128, 255, 255]),
+                normal_map([90, 190, 230, 255]),
+            ];
+            let surface = Shader::new(&scene).surface(&geometry, &point(view));
+            (shade::direct(&surface, &sun(light)).unwrap().radiance, surface)
+        };
+        let of = |image| texture().map(|t| TextureRef { image, ..t });
+        let bare = lit(below.clone()).0;
+        for textured in [false, true] {
+            let coat = Coat {
+                factor,
+                roughness,
+                texture: of(0).filter(|_| textured),
+                roughness_texture: of(0).filter(|_| textured),
+                ..Coat::default()
+            };
+            let scale = if textured { [0.6, 0.8] } else { [1.0, 1.0] };
+            let values = [f64::from(factor) * scale[0], f64::from(roughness) * scale[1]];
+            let (got, surface) = lit(Material {
+                coat: coat.clone(),
+                ..below.clone()
+            });
+            let directions = [DVec3::Z, view.as_dvec3(), light.as_dvec3()];
+            for i in 0..3 {
+                let want = coated(f64::from(bare[i]), values, directions);
+                assert!(
+                    (f64::from(got[i]) / want - 1.0).abs() < 1e-4,
+                    "{got} for {want} at {angles:?}"
+                );
+            }
+            // Emission passes the coat, and a white surrounding is reflected.
+            let weight = 1.0 - surface.coat.passed;
+            let want = Vec3::new(0.8, 0.5, 0.2) * (1.0 - weight) + weight + Vec3::Y * 3.0 * (1.0 - weight);
+            assert!(close(shade::ambient(&surface, Vec3::ONE), want, 1e-5));
+            // The coat has the normal of its own map, not that of the surface's.
+            let bent = |coat_map, below_map| {
+                lit(Material {
+                    coat: Coat {
+                        normal_texture: coat_map,
+                        ..coat.clone()
+                    },
+                    normal_texture: below_map,
+                    ..below.clone()
+                })
+                .1
+            };
+            assert_eq!(bent(None, of(2)).coat.normal, Vec3::Z);
+            assert!(bent(None, of(2)).normal.z < 0.95);
+            let own = bent(of(2), None);
+            assert_eq!((own.normal, own.coat.normal), (Vec3::Z, bent(None, of(2)).normal));
+        }
+    }
 }
 
 #[test]

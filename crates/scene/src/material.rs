@@ -58,6 +58,38 @@ pub struct Material {
     pub specular_color: Vec3,
     /// Specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
+    /// What lies over all of that.
+    pub coat: Coat,
+}
+
+/// A clear layer over a surface (`KHR_materials_clearcoat`), without one by default.
+#[derive(Clone, Debug)]
+pub struct Coat {
+    /// How much of the surface it covers, 0 to 1.
+    pub factor: f32,
+    /// Factor in red (linear).
+    pub texture: Option<TextureRef>,
+    /// Perceptual roughness.
+    pub roughness: f32,
+    /// Roughness in green (linear).
+    pub roughness_texture: Option<TextureRef>,
+    /// Tangent-space normal map (linear); the coat does not follow that of the surface below.
+    pub normal_texture: Option<TextureRef>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+}
+
+impl Default for Coat {
+    fn default() -> Self {
+        Self {
+            factor: 0.0,
+            texture: None,
+            roughness: 0.0,
+            roughness_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+        }
+    }
 }
 
 impl Default for Material {
@@ -89,6 +121,7 @@ impl Default for Material {
             specular_texture: None,
             specular_color: Vec3::ONE,
             specular_color_texture: None,
+            coat: Coat::default(),
         }
     }
 }

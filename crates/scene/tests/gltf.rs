@@ -285,6 +285,9 @@ fn materials_with_their_extensions_and_textures() {
                 "attenuationColor": [0.5, 0.6, 0.7]},
             "KHR_materials_ior": {"ior": 1.33},
             "KHR_materials_specular": {"specularFactor": 0.7, "specularColorFactor": [0.3, 2, 1]},
+            "KHR_materials_clearcoat": {"clearcoatFactor": 0.6, "clearcoatTexture": {"index": 0},
+                "clearcoatRoughnessFactor": 0.25, "clearcoatRoughnessTexture": moved,
+                "clearcoatNormalTexture": moved},
             "KHR_materials_unlit": {}}}]);
     let scene = file.load().expect("a sound file");
     assert_eq!(scene.meshes[0].primitives[0].material, 1);
@@ -313,6 +316,13 @@ fn materials_with_their_extensions_and_textures() {
     );
     assert_eq!((m.normal_texture, m.normal_scale), (Some(texture), 0.5));
     assert_eq!(m.transmission_texture.expect("a texture").uv_set, 0);
+    let coat = &m.coat;
+    assert_eq!((coat.factor, coat.roughness, coat.normal_scale), (0.6, 0.25, 0.5));
+    assert_eq!(coat.texture, m.transmission_texture);
+    assert_eq!(
+        (coat.roughness_texture, coat.normal_texture),
+        (Some(texture), Some(texture))
+    );
     assert_eq!(scene.images.len(), 1, "only what materials use is read");
     assert_eq!(scene.images[0].texels, [[10, 20, 30, 255], [40, 50, 60, 0]]);
     let sampler = scene.samplers[1];

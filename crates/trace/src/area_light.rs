@@ -137,6 +137,46 @@ impl AreaLight {
         }
     }
 
+    /// Density per steradian with which one of the samples that a point has lies in a unit direction, and where the direction
+    /// meets the light, if it does: its distance, infinite for the sun. For a point that the light shines at.
+    ///
+    /// The density is that of the plane of the samples, also beside the light; 0 where the direction leaves from the plane.
+    pub fn met(&self, point: DVec3, dir: Vec3) -> (f32, Option<f32>) {
+        let outline;
+        let (to, u, v) = match self.shape {
+            Shape::Rectangle | Shape::Disk => (
+                (self.center.as_dvec3() - point).as_vec3(),
+                self.half_u,
+                self.half_v,
+            ),
+            Shape::Sun => (self.center, self.half_u, self.half_v),
+            Shape::Sphere => {
+                outline = Outline::new(self, point);
+                let to = (self.center.as_dvec3() - point).as_vec3() + outline.middle;
+                (to, outline.u, outline.v)
+            }
+        };
+        let normal = u.cross(v);
+        let (area, steep) = (normal.length(), normal.dot(dir));
+        let distance = normal.dot(to) / steep;
+        if distance.is_nan() || distance <= 0.0 || area == 0.0 {
+            return (0.0, None);
+        }
+        let whole = match self.shape {
+            Shape::Rectangle => 4.0,
+            _ => std::f32::consts::PI,
+        };
+        let density = distance * distance / (whole * steep.abs());
+        let offset = dir * distance - to;
+        let [x, y] = [u, v].map(|half| offset.dot(half) / half.length_squared());
+        let met = match self.shape {
+            Shape::Rectangle => x.abs().max(y.abs()) <= 1.0,
+            _ => x * x + y * y <= 1.0,
+        };
+        let distance = if self.is_sun() { f32::INFINITY } else { distance };
+        (density, met.then_some(distance))
+    }
+
     /// On which side of a triangle all of the light is: above 0 its front, below 0 its back, 0 neither for certain.
     pub fn side(&self, corners: [Vec3; 3]) -> f64 {
         let [v0, v1, v2] = corners.map(Vec3::as_dvec3);
@@ -315,6 +355,51 @@ mod tests {
         }
         assert!((f64::from(near) / 25_600.0 - 0.5).abs() < 0.005, "{near}");
         assert!((f64::from(quarter) / 25_600.0 - 0.25).abs() < 0.005, "{quarter}");
+    }
+
+    #[test]
+    fn directions_meet_what_samples_lie_on() {
+        let (center, u, v) = (Vec3::new(1.0, 2.0, 3.0), Vec3::X * 0.5, Vec3::NEG_Z * 0.25);
+        let lights = [
+            AreaLight::rectangle(center, v, u),
+            AreaLight::disk(center, v, u),
+            AreaLight::sphere(center, 0.5),
+            AreaLight::sun(Vec3::new(0.3, 0.8, 0.1), 0.4),
+        ];
+        let point = DVec3::new(1.5, -0.5, 2.0);
+        const N: u16 = 1000;
+        for light in lights {
+            assert!(light.shines_at(point), "{light:?}");
+            // The density over all directions that meet the light is 1.
+            let (mut all, mut met) = (0.0, 0);
+            let step = std::f64::consts::TAU / f64::from(N) / f64::from(N);
+            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+                let y = (f32::from(i) + 0.5) / f32::from(N);
+                let (sin, cos) = ((f32::from(j) + 0.5) / f32::from(N) * std::f32::consts::TAU).sin_cos();
+                let across = (1.0 - y * y).sqrt();
+                if let (density, Some(_)) = light.met(point, Vec3::new(across * cos, y, across * sin)) {
+                    all += f64::from(density) * step;
+                    met += 1;
+                }
+            }
+            assert!(met > 1000 && (all - 1.0).abs() < 0.02, "{light:?}: {all}");
+            let samples = Samples::new(64, 5);
+            for k in 0..64 {
+                let (dir, far) = match light.sample(&samples, 0, point, k) {
+                    Light::Point(p) => {
+                        let to = p - point.as_vec3();
+                        (to.normalize(), to.length())
+                    }
+                    Light::Directional(dir) => (dir.normalize(), f32::INFINITY),
+                };
+                let distance = light.met(point, dir).1.expect("samples lie on the light");
+                assert!(
+                    distance == far || (distance - far).abs() < 1e-5,
+                    "{distance} for {far}"
+                );
+                assert_eq!(light.met(point, -dir), (0.0, None));
+            }
+        }
     }
 
     #[test]

@@ -3,6 +3,10 @@
 //! A light seen by a mirror that a diffuse ray found by chance would be a rare and very bright dot in the picture. Such
 //! mirrors show no lights, so their caustics are those of the environment alone.
 //!
+//! A light with a size is seen by the rays of mirrors and glossy reflections, and through boundaries of volumes, as what it
+//! is: a shape before all that lies behind it, which hides nothing. Glossy reflections have samples of it as well; each
+//! counts by the balance heuristic, as below. Limits: the eye sees no lights, neither through thin walls.
+//!
 //! Shadows are asked of the general structure, both sides of all triangles casting: the rule by which back faces
 //! alone may cast is one about what the eye sees.
 //!
@@ -16,17 +20,25 @@ use std::ops::ControlFlow;
 use glam::Vec3;
 use rayward_trace::{AreaLight, Light, exact};
 
-use super::{Arrival, BounceWork, Flight, SURROUNDING};
+use super::{Arrival, BounceWork, Flight, GLOSSY, SURROUNDING, absorbed};
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{Traced, brdf, direct, direct_from, lobes};
+use crate::shade::{LightRays, Traced, brdf, direct, direct_beside, lobes};
 use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
 
+/// Whether rays of a reflection see lights with a size; rougher ones have their samples alone.
+pub(super) fn shows_lights(mirror: &Surface) -> bool {
+    mirror.roughness <= GLOSSY
+}
+
 /// An arrival's surface as lights are seen by it: that of a mirror on the way of a diffuse ray reflects none.
 fn lit_surface(arrival: &Arrival) -> Surface {
-    let surface = arrival.surface;
+    let mut surface = arrival.surface;
+    if arrival.diffused && surface.coat.roughness < lobes::SMOOTH {
+        surface.coat.reflectance = 0.0;
+    }
     if !(arrival.diffused && lobes::is_smooth(&surface)) {
         return surface;
     }
@@ -80,12 +92,17 @@ impl TileShader<'_> {
             return Vec3::ZERO;
         }
         let samples = soft::samples(self.options, index, self.sample);
+        let rays = if arrival.diffused {
+            LightRays::default()
+        } else {
+            self.light_rays(surface, arrival.bounces, arrival.sharp)
+        };
         // What the eye sees of solids is lit in the paper's way where triangles are.
         let whole = (self.options.paper && arrival.bounces == 0).then(|| direct(surface, light));
         let mut sum = Vec3::ZERO;
         for k in 0..samples.count() {
             let end = area.sample(&samples, arrival.path.0, receiver.point, k);
-            if let Some(incident) = whole.unwrap_or_else(|| direct_from(surface, light, area, &end))
+            if let Some(incident) = whole.unwrap_or_else(|| direct_beside(surface, light, area, &end, &rays))
                 && self.is_turned_to(&end, arrival)
             {
                 *asked += 1;
@@ -93,6 +110,67 @@ impl TileShader<'_> {
             }
         }
         sum / samples.count() as f32
+    }
+
+    /// How many rays of the reflections of a surface see lights with a size.
+    pub(crate) fn light_rays(&self, surface: &Surface, bounces: u32, sharp: f32) -> LightRays {
+        let traced = self.traced(surface, bounces);
+        let drawn = |mirror: &Surface, traced: bool| {
+            if traced && shows_lights(mirror) && !self.options.paper {
+                self.reflected_rays(mirror, sharp)
+            } else {
+                0
+            }
+        };
+        let coat = surface.coated().map_or(0, |coat| drawn(&coat, traced.coat));
+        LightRays {
+            samples: self.options.samples,
+            drawn: [drawn(surface, traced.reflection), coat],
+        }
+    }
+
+    /// What a ray sees of the lights with a size before it meets something at a distance.
+    pub(super) fn lights_along(&self, flight: &Flight, end: f32) -> Vec3 {
+        if !flight.shows_lights {
+            return Vec3::ZERO;
+        }
+        let (from, dir) = (flight.ray.from.point, flight.ray.dir);
+        let mut seen = Vec3::ZERO;
+        for (light, plan) in self.lights.iter().zip(self.ends) {
+            let Some(area) = plan.as_ref().and_then(|plan| plan.area.as_ref()) else {
+                continue;
+            };
+            if !area.shines_at(from) || !area.is_valid() {
+                continue;
+            }
+            let (density, Some(distance)) = area.met(from, dir) else {
+                continue;
+            };
+            if distance > end {
+                continue;
+            }
+            let sample = if distance.is_finite() {
+                Light::Point((from + dir.as_dvec3() * f64::from(distance)).as_vec3())
+            } else {
+                Light::Directional(dir)
+            };
+            if let Some(incident) = light.incident_from(area, &sample, from.as_vec3()) {
+                let drawn = density * self.options.samples as f32;
+                let share = if flight.density.is_finite() {
+                    flight.density / (flight.density + drawn)
+                } else {
+                    1.0
+                };
+                // A volume that never ends is none.
+                let absorption = if distance.is_finite() {
+                    flight.absorption
+                } else {
+                    Vec3::ZERO
+                };
+                seen += incident.radiance * absorbed(absorption, distance) * (density * share);
+            }
+        }
+        seen
     }
 
     /// Adds the light of the environment to all arrivals.
@@ -110,17 +188,27 @@ impl TileShader<'_> {
                 self.reflected_rays(surface, arrival.sharp),
                 self.diffused_rays(surface, arrival.sharp),
             ];
+            let coat = surface.coated().map(|coat| {
+                let traced = Traced {
+                    reflection: traced.coat,
+                    ..Traced::default()
+                };
+                (coat, traced, [self.reflected_rays(&coat, arrival.sharp), 0])
+            });
             let directions = self.directions(arrival.sharp);
             for i in 0..directions {
                 let random = self.draw(arrival.path, SURROUNDING, self.sample * directions + i);
                 let sample = environment.sample(random);
                 let towards = sample.towards;
-                let cos = surface.normal.dot(towards);
-                if cos <= 0.0 || surface.geometric_normal.dot(towards) <= 0.0 {
+                if surface.geometric_normal.dot(towards) <= 0.0 {
                     continue;
                 }
                 let drawn = directions as f32 * sample.density;
-                let lit = lobes_lit(surface, towards, traced, rays, drawn) * (cos / drawn) * sample.radiance;
+                let mut lit = lobes_lit(surface, towards, traced, rays, drawn);
+                if let Some((coat, traced, rays)) = &coat {
+                    lit += lobes_lit(coat, towards, *traced, *rays, drawn);
+                }
+                lit *= sample.radiance;
                 if lit.max_element() <= 0.0 {
                     continue;
                 }
@@ -194,9 +282,13 @@ impl TileShader<'_> {
     }
 }
 
-/// The reflection model, each lobe with the share that drawn directions have of its light. Reflection and diffusion draw
-/// as many rays as given.
+/// The reflection model times the cosine over the density drawn with, each lobe with the share that drawn directions have of
+/// its light. Reflection and diffusion draw as many rays as given.
 fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], drawn: f32) -> Vec3 {
+    let cos = surface.normal.dot(towards);
+    if cos <= 0.0 {
+        return Vec3::ZERO;
+    }
     let density = |traced: bool, density: fn(&Surface, Vec3) -> f32, rays: u32| {
         if traced {
             rays as f32 * density(surface, towards)
@@ -210,5 +302,5 @@ fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], d
         let reflected = density(traced.reflection, lobes::reflection_density, rays[0]);
         lit += brdf::specular(surface, towards) * (drawn / (drawn + reflected));
     }
-    lit
+    lit * (cos / drawn)
 }

@@ -44,6 +44,7 @@ const REFLECTED: u32 = 1;
 const TRANSMITTED: u32 = 2;
 const DIFFUSED: u32 = 3;
 const SURROUNDING: u32 = 4;
+const COATED: u32 = 8;
 
 /// Which of all paths of a frame this is: what its random numbers depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +80,8 @@ struct Flight {
     diffuse: bool,
     /// Whether it or one before it was such.
     diffused: bool,
+    /// Whether it sees lights with a size.
+    shows_lights: bool,
     cone: Cone,
     path: Path,
 }
@@ -110,6 +113,8 @@ pub(crate) struct Arrival {
     sharp: f32,
     /// Whether a diffuse ray is on the path.
     diffused: bool,
+    /// Whether the last ray of the path sees lights with a size.
+    shows_lights: bool,
     surface: Surface,
     receiver: Receiver,
     on: OnSolid,
@@ -161,7 +166,9 @@ impl TileShader<'_> {
             return Traced::default();
         }
         let diffusion = bounces < self.options.diffuse_bounces;
+        let coat = &surface.coat;
         Traced {
+            coat: coat.reflectance > 0.0 && (diffusion || coat.roughness <= GLOSSY),
             reflection: diffusion || surface.roughness <= GLOSSY,
             transmission: surface.transmission > 0.0,
             diffusion,
@@ -177,14 +184,21 @@ impl TileShader<'_> {
         };
         let traced = self.traced(surface, bounces);
         let mut light = around(surface, surrounding, traced);
-        if let Some(environment) = self.environment
-            && !traced.reflection
-            && !surface.unlit
-            && lobes::is_smooth(surface)
-            && let Some(lobe) = lobes::reflected(surface, [0.5; 2])
-        {
-            // No direction that is drawn from the environment falls into a mirror's lobe.
-            light += lobe.weight * environment.radiance(lobe.towards);
+        let Some(environment) = self.environment.filter(|_| !surface.unlit) else {
+            return light;
+        };
+        let mut show = |mirror: &Surface, traced: bool| {
+            if !traced
+                && lobes::is_smooth(mirror)
+                && let Some(lobe) = lobes::reflected(mirror, [0.5; 2])
+            {
+                // No direction that is drawn from the environment falls into a mirror's lobe.
+                light += lobe.weight * environment.radiance(lobe.towards);
+            }
+        };
+        show(surface, traced.reflection);
+        if let Some(coat) = surface.coated() {
+            show(&coat, traced.coat);
         }
         light
     }
@@ -225,6 +239,7 @@ impl TileShader<'_> {
             weight: Vec3::splat(point.weight),
             sharp: 1.0,
             diffused: false,
+            shows_lights: false,
             surface: point.surface,
             receiver: point.receiver,
             on: point.on,
@@ -268,7 +283,13 @@ impl TileShader<'_> {
             }
             for (flight, hit) in work.flights.iter().zip(&work.hits) {
                 let end = hit.map_or(f64::INFINITY, |(_, hit)| hit.t);
-                if let Some(solid) = self.solid_before(flight, end) {
+                let solid = self.solid_before(flight, end);
+                let nearest = solid.map_or(end, |(_, crossing)| crossing.t);
+                let lights = self.lights_along(flight, nearest as f32);
+                if lights != Vec3::ZERO {
+                    add(out, flight.pixel, flight.weight * lights);
+                }
+                if let Some(solid) = solid {
                     self.arrive_on_solid(flight, &solid, &mut work.arrivals);
                     continue;
                 }
@@ -334,6 +355,7 @@ impl TileShader<'_> {
                 weight: weight * surface.alpha,
                 sharp: flight.sharp,
                 diffused: flight.diffused,
+                shows_lights: flight.shows_lights,
                 receiver,
                 on: None,
                 bounces: flight.bounces,
@@ -376,6 +398,7 @@ impl TileShader<'_> {
             weight: flight.weight * absorbed(inside, distance),
             sharp: flight.sharp,
             diffused: flight.diffused,
+            shows_lights: flight.shows_lights,
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,
@@ -396,9 +419,12 @@ impl TileShader<'_> {
         let surface = &arrival.surface;
         let traced = self.traced(surface, arrival.bounces);
         if traced.reflection {
-            let rays = self.reflected_rays(surface, arrival.sharp);
-            let draw = |random| lobes::reflected(surface, random);
-            self.send(arrival, REFLECTED, rays, arrival.absorption, draw, next);
+            self.send_mirrored(arrival, (REFLECTED, surface), next);
+        }
+        if traced.coat
+            && let Some(coat) = surface.coated()
+        {
+            self.send_mirrored(arrival, (COATED, &coat), next);
         }
         if traced.transmission {
             let behind = match (surface.thin, surface.enters_volume()) {
@@ -409,13 +435,20 @@ impl TileShader<'_> {
             let smooth = lobes::is_smooth(surface);
             let rays = self.rays(arrival.sharp, smooth, surface.transmission);
             let draw = |random| lobes::transmitted(surface, random);
-            self.send(arrival, TRANSMITTED, rays, behind, draw, next);
+            self.send(arrival, (TRANSMITTED, surface), rays, behind, draw, next);
         }
         if traced.diffusion {
             let rays = self.diffused_rays(surface, arrival.sharp);
             let draw = |random| lobes::diffused(surface, random);
-            self.send(arrival, DIFFUSED, rays, arrival.absorption, draw, next);
+            self.send(arrival, (DIFFUSED, surface), rays, arrival.absorption, draw, next);
         }
+    }
+
+    /// Sends out the rays of a reflection, of the surface or its coat.
+    fn send_mirrored(&self, arrival: &Arrival, (purpose, mirror): (u32, &Surface), next: &mut Vec<Flight>) {
+        let rays = self.reflected_rays(mirror, arrival.sharp);
+        let draw = |random| lobes::reflected(mirror, random);
+        self.send(arrival, (purpose, mirror), rays, arrival.absorption, draw, next);
     }
 
     /// How many rays a lobe draws that passes on about this share of its light, at a surface that this share of the
@@ -444,23 +477,27 @@ impl TileShader<'_> {
         worth(self.options.environment_samples, sharp)
     }
 
-    /// Sends out the rays of one lobe.
+    /// Sends out the rays of one lobe, of the surface or its coat.
     fn send(
         &self,
         arrival: &Arrival,
-        purpose: u32,
+        (purpose, surface): (u32, &Surface),
         rays: u32,
         absorption: Vec3,
         draw: impl Fn([f32; 2]) -> Option<Lobe>,
         next: &mut Vec<Flight>,
     ) {
-        let surface = &arrival.surface;
         let drawn = match self.environment {
             None => 0.0,
             Some(_) => self.directions(arrival.sharp) as f32,
         };
         let smooth = purpose != DIFFUSED && lobes::is_smooth(surface);
-        let diffuse = purpose == DIFFUSED || (purpose == REFLECTED && surface.roughness > GLOSSY);
+        let shows_lights = match purpose {
+            DIFFUSED => false,
+            TRANSMITTED => !surface.thin || arrival.shows_lights,
+            _ => light::shows_lights(surface),
+        } && !self.options.paper;
+        let diffuse = purpose == DIFFUSED || (purpose != TRANSMITTED && surface.roughness > GLOSSY);
         for i in 0..rays {
             let k = self.sample * rays + i;
             let Some(lobe) = draw(self.draw(arrival.path, purpose, k)) else {
@@ -496,6 +533,7 @@ impl TileShader<'_> {
                 absorption,
                 diffuse,
                 diffused: diffuse || arrival.diffused,
+                shows_lights: shows_lights && !arrival.diffused,
                 cone: Cone {
                     spread: arrival.cone.spread.max(spread),
                     ..arrival.cone

@@ -22,7 +22,7 @@ use super::Surface;
 /// Smallest width of the microfacet distribution.
 pub const MIN_ALPHA: f32 = 1e-3;
 
-/// The BRDF for light from the unit direction `towards`, per steradian, without the cosine.
+/// The BRDF below the coat for light from the unit direction `towards`, per steradian, without the cosine.
 #[inline]
 pub fn evaluate(surface: &Surface, towards: Vec3) -> Vec3 {
     diffuse(surface, towards) + specular(surface, towards)
@@ -34,7 +34,7 @@ pub fn diffuse(surface: &Surface, towards: Vec3) -> Vec3 {
     let half = (towards + surface.view).normalize_or(surface.normal);
     let reflected = dielectric_reflectance(surface, surface.view.dot(half));
     let share = (1.0 - surface.metallic) * (1.0 - surface.transmission) / PI;
-    surface.base_color * ((1.0 - reflected.max_element()).max(0.0) * share)
+    surface.base_color * ((1.0 - reflected.max_element()).max(0.0) * share * surface.coat.passed)
 }
 
 /// The reflected part of [`evaluate`].
@@ -50,13 +50,13 @@ pub fn specular(surface: &Surface, towards: Vec3) -> Vec3 {
     reflectance(surface, view.dot(half)) * lobe
 }
 
-/// What a facet reflects at this cosine between its normal and the viewer.
+/// What a facet below the coat reflects at this cosine between its normal and the viewer.
 #[inline]
 pub fn reflectance(surface: &Surface, cos: f32) -> Vec3 {
     let grazing = schlick(cos);
     let base = surface.base_color;
     let metal = base + (Vec3::ONE - base) * grazing;
-    dielectric_reflectance(surface, cos).lerp(metal, surface.metallic)
+    dielectric_reflectance(surface, cos).lerp(metal, surface.metallic) * surface.coat.passed
 }
 
 /// What a facet of the dielectric reflects: Schlick's rise from `f0` to 1 or, where light passes, Fresnel's, which
@@ -92,7 +92,7 @@ fn fresnel(cos: f32, ratio: f32) -> Option<f32> {
 }
 
 #[inline]
-fn schlick(cos: f32) -> f32 {
+pub(super) fn schlick(cos: f32) -> f32 {
     let grazing = (1.0 - cos.abs()).max(0.0);
     grazing * grazing * (grazing * grazing) * grazing
 }

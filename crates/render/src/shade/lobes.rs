@@ -35,7 +35,7 @@ pub struct Lobe {
 
 /// Where a reflected ray goes on; `None` if the surface takes it up itself.
 pub fn reflected(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
-    let normal = seen_normal(surface);
+    let normal = surface_seen(surface);
     let view = surface.view;
     if is_smooth(surface) {
         let mirrored = 2.0 * normal.dot(view) * normal - view;
@@ -62,7 +62,7 @@ pub fn reflected(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
 
 /// Density with which [`reflected`] draws a direction; 0 for smooth surfaces, which draw none.
 pub fn reflection_density(surface: &Surface, towards: Vec3) -> f32 {
-    let normal = seen_normal(surface);
+    let normal = surface_seen(surface);
     let (cos_view, cos_light) = (normal.dot(surface.view), normal.dot(towards));
     if is_smooth(surface) || cos_light <= 0.0 {
         return 0.0;
@@ -80,7 +80,7 @@ pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
     if through <= 0.0 {
         return None;
     }
-    let normal = seen_normal(surface);
+    let normal = surface_seen(surface);
     let view = surface.view;
     let smooth = is_smooth(surface);
     let half = if smooth {
@@ -112,7 +112,7 @@ pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
     };
     Some(Lobe {
         towards: above(towards, -surface.geometric_normal),
-        weight: surface.base_color * passed * (through * shadowed),
+        weight: surface.base_color * passed * (through * shadowed * surface.coat.passed),
         density: f32::INFINITY,
     })
 }
@@ -154,14 +154,18 @@ fn refracted(view: Vec3, half: Vec3, ratio: f32) -> Option<Vec3> {
     (below > 0.0).then(|| (half * (ratio * cos - below.sqrt()) - view * ratio).normalize_or(-view))
 }
 
-/// The shading normal, bent towards the viewer where interpolation or a normal map has turned it away.
-fn seen_normal(surface: &Surface) -> Vec3 {
+fn surface_seen(surface: &Surface) -> Vec3 {
+    seen_normal([surface.normal, surface.geometric_normal], surface.view)
+}
+
+/// The first of two normals, bent towards the viewer where interpolation or a normal map has turned it away.
+pub(super) fn seen_normal([normal, geometric]: [Vec3; 2], view: Vec3) -> Vec3 {
     const LEAST: f32 = 0.01;
-    let cos = surface.normal.dot(surface.view);
+    let cos = normal.dot(view);
     if cos >= LEAST {
-        surface.normal
+        normal
     } else {
-        (surface.normal + surface.view * (LEAST - cos)).normalize_or(surface.geometric_normal)
+        (normal + view * (LEAST - cos)).normalize_or(geometric)
     }
 }
 

@@ -12,6 +12,7 @@
 //! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
 
 pub mod brdf;
+mod coat;
 mod light;
 pub mod lobes;
 mod surface;
@@ -19,6 +20,7 @@ mod surface;
 use glam::Vec3;
 use rayward_trace::{AreaLight, Light};
 
+pub use coat::Coat;
 pub use light::{Incident, ShadingLight};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
 
@@ -29,7 +31,7 @@ pub fn direct(surface: &Surface, light: &ShadingLight) -> Option<Incident> {
     if surface.unlit {
         return None;
     }
-    reflected(surface, light.incident(surface.position)?)
+    reflected(surface, light.incident(surface.position)?, &[1.0; 2])
 }
 
 /// As [`direct`], for a sample of a light with a size: what the surface would send if the whole light were like the
@@ -41,19 +43,70 @@ pub fn direct_from(
     area: &AreaLight,
     sample: &Light,
 ) -> Option<Incident> {
+    direct_beside(surface, light, area, sample, &LightRays::default())
+}
+
+/// As [`direct_from`], where rays that the reflections draw meet the light, too: each way counts by its share of the
+/// densities (the balance heuristic of Veach and Guibas 1995).
+#[inline]
+pub(crate) fn direct_beside(
+    surface: &Surface,
+    light: &ShadingLight,
+    area: &AreaLight,
+    sample: &Light,
+    rays: &LightRays,
+) -> Option<Incident> {
     if surface.unlit {
         return None;
     }
-    reflected(surface, light.incident_from(area, sample, surface.position)?)
+    let incident = light.incident_from(area, sample, surface.position)?;
+    if rays.drawn == [0; 2] {
+        return reflected(surface, incident, &[1.0; 2]);
+    }
+    let density = area.met(surface.position.as_dvec3(), incident.towards).0 * rays.samples as f32;
+    let share = |mirror: &Surface, drawn: u32| {
+        if drawn == 0 {
+            return 1.0;
+        }
+        if lobes::is_smooth(mirror) {
+            return 0.0;
+        }
+        let other = drawn as f32 * lobes::reflection_density(mirror, incident.towards);
+        if density > 0.0 {
+            density / (density + other)
+        } else {
+            1.0
+        }
+    };
+    let coat = surface.coated().map_or(1.0, |coat| share(&coat, rays.drawn[1]));
+    reflected(surface, incident, &[share(surface, rays.drawn[0]), coat])
 }
 
+/// Rays of a surface's reflections that see lights with a size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct LightRays {
+    /// Samples that the surface has of a light.
+    pub(crate) samples: u32,
+    /// Rays of its own reflection, and of its coat's.
+    pub(crate) drawn: [u32; 2],
+}
+
+/// What a surface reflects of the light that arrives, its own and its coat's highlights by these shares.
 #[inline]
-fn reflected(surface: &Surface, mut incident: Incident) -> Option<Incident> {
-    let cos_shading = surface.normal.dot(incident.towards);
-    if cos_shading <= 0.0 || surface.geometric_normal.dot(incident.towards) <= 0.0 {
+fn reflected(surface: &Surface, mut incident: Incident, shares: &[f32; 2]) -> Option<Incident> {
+    let towards = incident.towards;
+    let cos = surface.normal.dot(towards);
+    let coat = surface.coated().map(|coat| (coat, coat.normal.dot(towards)));
+    let faces = cos > 0.0 || coat.is_some_and(|(_, cos)| cos > 0.0);
+    if !faces || surface.geometric_normal.dot(towards) <= 0.0 {
         return None;
     }
-    incident.radiance *= brdf::evaluate(surface, incident.towards) * cos_shading;
+    let highlight = brdf::specular(surface, towards) * shares[0];
+    let mut sent = (brdf::diffuse(surface, towards) + highlight) * cos.max(0.0);
+    if let Some((coat, cos)) = coat {
+        sent += brdf::specular(&coat, towards) * (cos.max(0.0) * shares[1]);
+    }
+    incident.radiance *= sent;
     Some(incident)
 }
 
@@ -66,6 +119,8 @@ pub struct Traced {
     pub transmission: bool,
     /// Diffuse light.
     pub diffusion: bool,
+    /// Reflection of the coat.
+    pub coat: bool,
 }
 
 /// Radiance that does not come from a light: emission, and the reflection of a surrounding that has the radiance
@@ -87,12 +142,18 @@ pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
         dielectric * surface.transmission,
         dielectric * (1.0 - surface.transmission),
     );
-    let left = if traced == Traced::default() {
+    let below = Traced {
+        coat: false,
+        ..traced
+    };
+    let left = if below == Traced::default() {
         1.0
     } else {
         share(traced.reflection, surface.metallic)
             + share(traced.transmission, through)
             + share(traced.diffusion, back)
     };
-    surface.emissive + surrounding * surface.base_color * (surface.occlusion * left)
+    let coat = Vec3::splat(share(traced.coat, surface.coat.reflectance));
+    let around = surrounding * surface.base_color * (surface.occlusion * left);
+    (surface.emissive + around) * surface.coat.passed + surrounding * coat * surface.occlusion
 }

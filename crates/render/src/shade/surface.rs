@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
 use rayward_trace::solids::Crossing;
 
+use super::coat::Coat;
 use crate::casters::is_thin_glass;
 use crate::texture::{Encoding, Texture, Textures};
 
@@ -85,6 +86,8 @@ pub struct Surface {
     pub unlit: bool,
     /// Whether the viewer is on the front side of the triangle.
     pub front: bool,
+    /// What lies over all of that.
+    pub coat: Coat,
 }
 
 impl Surface {
@@ -141,10 +144,22 @@ struct ShaderMaterial {
     specular_texture: Option<Texture>,
     specular_color_texture: Option<Texture>,
     transmission_texture: Option<Texture>,
+    coat: ShaderCoat,
+}
+
+/// A coat with its textures resolved.
+#[derive(Clone, Debug)]
+struct ShaderCoat {
+    factor: f32,
+    roughness: f32,
+    normal_scale: f32,
+    texture: Option<Texture>,
+    roughness_texture: Option<Texture>,
+    normal_texture: Option<Texture>,
 }
 
 /// The texture references of a material that shading uses, with their encodings.
-fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 8] {
+fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 11] {
     [
         (material.base_color_texture, Encoding::Srgb),
         (material.metallic_roughness_texture, Encoding::Linear),
@@ -154,6 +169,9 @@ fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 8] {
         (material.specular_texture, Encoding::Linear),
         (material.specular_color_texture, Encoding::Srgb),
         (material.transmission_texture, Encoding::Linear),
+        (material.coat.texture, Encoding::Linear),
+        (material.coat.roughness_texture, Encoding::Linear),
+        (material.coat.normal_texture, Encoding::Linear),
     ]
 }
 
@@ -200,6 +218,14 @@ impl ShaderMaterial {
             specular_texture: resolved[5],
             specular_color_texture: resolved[6],
             transmission_texture: resolved[7],
+            coat: ShaderCoat {
+                factor: material.coat.factor,
+                roughness: material.coat.roughness,
+                normal_scale: material.coat.normal_scale,
+                texture: resolved[8],
+                roughness_texture: resolved[9],
+                normal_texture: resolved[10],
+            },
         }
     }
 
@@ -399,17 +425,14 @@ impl<'s> Shader<'s> {
         let transmission = lookup
             .get(&material.transmission_texture)
             .map_or(1.0, |texel| texel.x);
+        let normal = |map: (&Option<Texture>, f32)| {
+            let sides = [outward, geometric_normal];
+            shading_normal(geometry, &corners, map, &lookup, edges, sides)
+        };
         Surface {
             position: positions[0] + edges[0] * point.u + edges[1] * point.v,
             geometric_normal,
-            normal: shading_normal(
-                geometry,
-                &corners,
-                material,
-                &lookup,
-                edges,
-                [outward, geometric_normal],
-            ),
+            normal: normal((&material.normal_texture, material.normal_scale)),
             view: point.view,
             base_color: base.xyz(),
             alpha: material.coverage(base.w),
@@ -425,6 +448,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             unlit: material.unlit,
             front,
+            coat: coat(&material.coat, &lookup, [point.view, geometric_normal], normal),
         }
     }
 
@@ -459,6 +483,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0,
             unlit: material.unlit,
             front: crossing.enters,
+            coat: Coat::new(material.coat.factor, material.coat.roughness, [normal; 2], view),
         }
     }
 
@@ -502,12 +527,33 @@ fn base_color(
     material.base_color * vertex * lookup.get(&material.base_color_texture).unwrap_or(Vec4::ONE)
 }
 
+/// The coat at a point; `normal` bends the surface's normal by a map and its scale.
+#[inline]
+fn coat(
+    coat: &ShaderCoat,
+    lookup: &Lookup,
+    [view, geometric]: [Vec3; 2],
+    normal: impl Fn((&Option<Texture>, f32)) -> Vec3,
+) -> Coat {
+    if coat.factor == 0.0 {
+        return Coat::NONE;
+    }
+    let factor = lookup.get(&coat.texture).map_or(1.0, |texel| texel.x);
+    let roughness = lookup.get(&coat.roughness_texture).map_or(1.0, |texel| texel.y);
+    Coat::new(
+        coat.factor * factor,
+        coat.roughness * roughness,
+        [normal((&coat.normal_texture, coat.normal_scale)), geometric],
+        view,
+    )
+}
+
 /// The interpolated and bent normal, turned to the side of `facing`; `outward` where there are no normals.
 #[inline]
 fn shading_normal(
     geometry: &FrameGeometry,
     corners: &Corners,
-    material: &ShaderMaterial,
+    (map, scale): (&Option<Texture>, f32),
     lookup: &Lookup,
     edges: [Vec3; 2],
     [outward, facing]: [Vec3; 2],
@@ -519,16 +565,16 @@ fn shading_normal(
     let normal = smooth.unwrap_or(outward);
     // The whole tangent frame is mirrored for a viewer on the other side.
     let side = if normal.dot(facing) < 0.0 { -1.0 } else { 1.0 };
-    let Some(texture) = &material.normal_texture else {
+    let Some(texture) = map else {
         return normal * side;
     };
-    let Some(texel) = lookup.get(&material.normal_texture) else {
+    let Some(texel) = lookup.get(map) else {
         return normal * side;
     };
     let Some((tangent, handedness)) = tangent(geometry, corners, texture, lookup, edges, normal) else {
         return normal * side;
     };
-    let bent = (texel.xyz() * 2.0 - Vec3::ONE) * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
+    let bent = (texel.xyz() * 2.0 - Vec3::ONE) * Vec3::new(scale, scale, 1.0);
     let bitangent = normal.cross(tangent) * handedness;
     (tangent * bent.x + bitangent * bent.y + normal * bent.z).normalize_or(normal) * side
 }

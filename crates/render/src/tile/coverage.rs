@@ -80,7 +80,8 @@ impl Sharing {
         let offset = |k| options.pixel_filter.offset(k);
         let sharp = |material: u32| {
             let material = &scene.materials[material as usize];
-            !material.unlit && (material.roughness < lobes::SMOOTH || material.transmission > 0.0)
+            let coated = material.coat.factor > 0.0 && material.coat.roughness < lobes::SMOOTH;
+            !material.unlit && (material.roughness < lobes::SMOOTH || material.transmission > 0.0 || coated)
         };
         Self {
             offsets: (0..options.pixel_samples).map(offset).collect(),

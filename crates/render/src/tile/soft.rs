@@ -11,7 +11,7 @@ use super::{TileShader, TileWork};
 use crate::RenderOptions;
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{direct, direct_from};
+use crate::shade::{direct, direct_beside};
 use crate::structures::LightShadows;
 
 /// The samples of a light: each light, and each sample of the pixels, has sets of its own.
@@ -120,6 +120,7 @@ impl TileShader<'_> {
             }
             let (receiver, pixel) = (work.receivers[n], work.pixels[n]);
             let surface = &work.points[i as usize].surface;
+            let rays = self.light_rays(surface, 0, 1.0);
             let certain = area.side(triangles(self.geometry).corners(receiver.prim)) != 0.0;
             let mut sum = Vec3::ZERO;
             for k in (0..samples.count()).filter(|k| visible[*k as usize / 32] >> (k % 32) & 1 != 0) {
@@ -130,7 +131,8 @@ impl TileShader<'_> {
                 let sent = if self.options.paper {
                     Some(radiance)
                 } else {
-                    direct_from(surface, &self.lights[light], area, &end).map(|incident| incident.radiance)
+                    let incident = direct_beside(surface, &self.lights[light], area, &end, &rays);
+                    incident.map(|incident| incident.radiance)
                 };
                 if let Some(sent) = sent
                     && !self.solid_hides(light, &receiver, &end)
