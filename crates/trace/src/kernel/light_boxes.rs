@@ -95,8 +95,8 @@ fn look_impl<S: Simd>(simd: S, sight: &Sight, corners: &Corners, bounds: &mut [[
             let mut beyond = [low[axis].simd_gt(splat(1.0)), high[axis].simd_lt(splat(-1.0))];
             for corner in 0..3 {
                 let edge = splat(1.0) + splat(reach) * nearness[corner] + splat(1e-5);
-                beyond[0] = beyond[0] & at[corner].simd_gt(edge);
-                beyond[1] = beyond[1] & (-at[corner]).simd_gt(edge);
+                beyond[0] &= at[corner].simd_gt(edge);
+                beyond[1] &= (-at[corner]).simd_gt(edge);
             }
             apart = apart | beyond[0] | beyond[1];
         }
