@@ -13,11 +13,12 @@
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` where it is set. Run as a test it does little.
 
+use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 use rayward::CameraFrame;
-use rayward_gpu::trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, StepCounts};
+use rayward_gpu::trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, StepCounts, TILE};
 use rayward_gpu::trace::{Bvh, Hit, Ldc, LdcOptions, Light, Ray, Receiver, Triangles, View, ViewRay, exact};
 use rayward_gpu::{Cube, CubeOptions, Gpu, GpuBvh, GpuGrid, GridGeometry, TraceStats};
 use rayward_scene::{FrameGeometry, LoadOptions, default_camera, default_lights};
@@ -191,6 +192,8 @@ struct Errors {
     false_hits: usize,
     /// Of both, outside of the band around silhouettes.
     clear: [usize; 2],
+    /// Rays of the former that are missed, with what they should hit.
+    missed_clear: Vec<(Ray, u32, f64)>,
     wrong_triangle: usize,
     /// Of both that hit, in texels.
     off: Vec<f64>,
@@ -238,6 +241,8 @@ impl Errors {
         self.false_hits += usize::from(is_false);
         if (missed || is_false) && !judge.near_silhouette(ray, found) {
             self.clear[usize::from(is_false)] += 1;
+            let truth = truth.filter(|_| missed);
+            self.missed_clear.extend(truth.map(|(prim, t)| (*ray, prim, t)));
         }
         if let (Some(found), Some(truth)) = (found, truth) {
             self.wrong_triangle += usize::from(found.0 != truth.0);
@@ -274,6 +279,61 @@ impl Errors {
             each(steps.triangles),
         );
     }
+}
+
+/// The test on planes.
+const PLANE: HitTest = HitTest::Plane { margin: 0.25 };
+
+/// Says what samples there are of the triangles that rays should have hit.
+fn why_missed(cube: &Ldc, triangles: Triangles, missed: &[(Ray, u32, f64)]) {
+    let wanted: HashSet<u32> = missed.iter().map(|&(_, prim, _)| prim).collect();
+    let mut texels: HashMap<u32, HashSet<u32>> = HashMap::new();
+    for sample in (0..3).flat_map(|axis| cube.texel_samples(axis)) {
+        if wanted.contains(&sample.prim) {
+            texels.entry(sample.prim).or_default().insert(sample.texel);
+        }
+    }
+    let [mut nowhere, mut elsewhere, mut there] = [0; 3];
+    for (ray, prim, t) in missed {
+        let axis = triangles.normal(*prim).abs().max_position();
+        let point = ray.origin.as_dvec3() + ray.dir.as_dvec3() * *t;
+        let at = cube.frame().texel(point).to_array();
+        let [column, row] = [1, 2].map(|i| at[(axis + i) % 3] as u32);
+        let columns = cube.size()[(axis + 1) % 3];
+        let tile = (row / TILE) * (columns / TILE) + column / TILE;
+        let texel = tile * TILE * TILE + (row % TILE) * TILE + column % TILE;
+        match texels.get(prim) {
+            None => nowhere += 1,
+            Some(own) if own.contains(&texel) => there += 1,
+            Some(_) => elsewhere += 1,
+        }
+    }
+    println!(
+        "  {:<24} of {} missed: {nowhere} on triangles without a sample, {elsewhere} with none in the texel of the hit, {there} with one",
+        "",
+        missed.len()
+    );
+}
+
+/// The hit tests on samples, with cubes for them.
+fn by_samples<'c>(
+    resolution: u32,
+    paper: &'c Ldc<'c>,
+    sampled: &'c Ldc<'c>,
+    exact: &'c Ldc<'c>,
+) -> [(&'static str, &'c Ldc<'c>, HitTest); 5] {
+    let tolerance = HitTest::paper_tolerance(resolution);
+    [
+        ("strict, paper", paper, HitTest::Strict { tolerance }),
+        ("interval, paper", paper, HitTest::Interval { tolerance }),
+        (
+            "interval, half a texel",
+            sampled,
+            HitTest::Interval { tolerance: 0.5 },
+        ),
+        ("plane", sampled, PLANE),
+        ("plane, conservative", exact, PLANE),
+    ]
 }
 
 fn report(name: &str, geometry: &FrameGeometry, resolution: u32, count: usize, gpu: Option<&Gpu>) {
@@ -331,22 +391,16 @@ fn report(name: &str, geometry: &FrameGeometry, resolution: u32, count: usize, g
             errors.add(ray, found, *truth, &judge);
         }
         errors.print(name, rays.len(), time, &steps);
+        errors
     };
-    let tolerance = HitTest::paper_tolerance(resolution);
-    for (name, cube, test) in [
-        ("strict, paper", &paper, HitTest::Strict { tolerance }),
-        ("interval, paper", &paper, HitTest::Interval { tolerance }),
-        (
-            "interval, half a texel",
-            &sampled,
-            HitTest::Interval { tolerance: 0.5 },
-        ),
-        ("plane", &sampled, HitTest::Plane { margin: 0.25 }),
-    ] {
-        measure(name, &|ray, steps| {
+    for (name, cube, test) in by_samples(resolution, &paper, &sampled, &exact) {
+        let errors = measure(name, &|ray, steps| {
             cube.closest_sampled(ray, test, steps)
                 .map(|hit| (hit.prim, f64::from(hit.t)))
         });
+        if test == PLANE && !errors.missed_clear.is_empty() {
+            why_missed(cube, triangles, &errors.missed_clear);
+        }
     }
     measure("exact", &|ray, steps| {
         exact.closest(ray, steps).map(|(prim, hit)| (prim, hit.t))
@@ -431,7 +485,7 @@ fn on_gpu(gpu: &Gpu, triangles: Triangles, bvh: &Bvh, resolution: u32, few: &Few
     for (name, test) in [
         ("GPU strict", HitTest::Strict { tolerance }),
         ("GPU interval", HitTest::Interval { tolerance }),
-        ("GPU plane", HitTest::Plane { margin: 0.25 }),
+        ("GPU plane", PLANE),
     ] {
         let (answers, ms) = timed(|| sampled.closest_sampled(&few.rays, test).expect("answers"));
         few.print(name, &answers, ms);

@@ -215,12 +215,11 @@ pub(crate) struct Structure<'c> {
 /// Tells the place of the ray of a number: its cell, its view.
 pub(crate) type Placing<'c> = dyn Fn(usize) -> Option<(u32, &'c View)> + Sync + 'c;
 
-/// One structure or two, and the entry point that traces rays through them.
+/// One structure or two, and the program that traces rays through them.
 pub(crate) struct Traced<'c> {
     pub(crate) gpu: &'c Gpu,
     pub(crate) triangles: Triangles<'c>,
     pub(crate) program: &'static Program,
-    pub(crate) entry: &'static str,
     pub(crate) structures: Vec<Structure<'c>>,
 }
 
@@ -482,7 +481,7 @@ impl Traced<'_> {
             bindings.push((9, &placed));
         }
         let groups = (batch.len() as u64).div_ceil(64);
-        gpu.dispatch(self.program, self.entry, &bindings, groups)?;
+        gpu.dispatch(self.program, "trace", &bindings, groups)?;
         gpu.read(&found, 0, batch.len() as u64)
     }
 }

@@ -9,6 +9,7 @@
 //! | `bvh/`, `bvh.wgsl` | rays through a hierarchy, for comparison |
 //! | `grid/`, `grid.wgsl`, `look.wgsl` | rays of a vantage through its perspective grid (HM08) |
 //! | `batch.rs` | arrays of rays to answers, for all of these |
+//! | `skin/`, `skin.wgsl` | vertices of animated scenes, posed on the device |
 //! | `secondary.rs` | the cube in frames of `rayward` |
 //!
 //! [`trace::ldc`] is the reference of every stage. Rays are arrays in, answers arrays out. Hits by samples are those
@@ -42,6 +43,7 @@ mod error;
 mod grid;
 mod ldc;
 mod secondary;
+mod skin;
 #[cfg(test)]
 mod tests;
 
@@ -51,5 +53,6 @@ pub use bvh::GpuBvh;
 pub use device::{AdapterSummary, Gpu, adapters};
 pub use error::{Error, Result};
 pub use grid::{GpuGrid, GridGeometry};
-pub use ldc::{Cube, CubeOptions, TraceStats};
+pub use ldc::{Cube, CubeOptions, StillCube, TraceStats};
 pub use secondary::{GpuSecondary, Through};
+pub use skin::{GpuSkin, PosedVertices};

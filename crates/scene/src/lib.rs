@@ -26,6 +26,7 @@ pub use error::{Error, Notice};
 pub use frame::{FrameGeometry, ObjectRange, PosedCamera, PosedLight, VertexAttributes};
 pub use load::{LoadOptions, UpAxis, load};
 pub use material::{AlphaMode, Coat, Image, Material, Sampler, TextureRef, TextureTransform, Wrap};
+pub use pose::ObjectMotion;
 pub use scene::{
     Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Mesh, MorphTarget, Node,
     Primitive, Projection, Scene, Skin, Transform,

@@ -259,6 +259,52 @@ fn skins_blend_joints_and_ignore_the_node() {
     assert_eq!(position(&frame, 2), Vec3::new(0.0, 1.0, 1.0));
 }
 
+/// Whether what moves vertices gives the frame's positions, but for the last bit.
+fn assert_motions_match(scene: &Scene, time: f32) {
+    let frame = scene.at(time);
+    let mut vertex = 0;
+    for motion in scene.motions(Some(0), time) {
+        for v in 0..motion.primitive.positions.len() {
+            let local = motion.local(v);
+            let moved = motion
+                .influences(v)
+                .into_iter()
+                .filter(|(_, weight)| *weight != 0.0)
+                .map(|(joint, weight)| motion.matrices[joint].transform_point3(local) * weight)
+                .sum::<DVec3>();
+            let error = moved.as_vec3().distance(frame.position(vertex));
+            assert!(
+                error <= 2e-7 * moved.length() as f32 + 1e-7,
+                "{} at {time}, vertex {vertex}: off by {error}",
+                scene.name
+            );
+            vertex += 1;
+        }
+    }
+    assert_eq!(vertex as usize, frame.x.len());
+}
+
+#[test]
+fn motions_take_vertices_where_frames_have_them() {
+    let mut morphed = skinned();
+    morphed.meshes[0].primitives[0].morph_targets = vec![MorphTarget {
+        positions: vec![Vec3::X, Vec3::Y, Vec3::NEG_Z],
+        ..MorphTarget::default()
+    }];
+    morphed.meshes[0].weights = vec![0.25];
+    morphed.nodes.push(at(moved(DVec3::new(0.0, 7.0, 0.0))));
+    assert!(morphed.motions(None, 0.0)[0].skinned && !morphed.motions(None, 0.0)[1].skinned);
+    assert_motions_match(&morphed, 0.0);
+    let far = scene_of(triangle(), vec![at(moved(DVec3::splat(1e6)))]);
+    assert_motions_match(&far, 0.0);
+    for name in ["walker", "courtyard"] {
+        let scene = rayward_scene::builtin::build(name).expect("a built-in scene");
+        for time in [0.0, 0.37, 1.9] {
+            assert_motions_match(&scene, time);
+        }
+    }
+}
+
 #[test]
 fn mirrored_joints_turn_the_winding() {
     let mut scene = skinned();

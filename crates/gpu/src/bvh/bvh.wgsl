@@ -37,14 +37,7 @@ fn slabs(low: vec4f, high: vec4f, origin: f32, inverse: f32) -> Slabs {
     return Slabs(min(a, b), max(a, b));
 }
 
-@compute @workgroup_size(64)
-fn trace_tree(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-              @builtin(local_invocation_index) local: u32) {
-    let index = thread_index(group, groups, local, 64u);
-    if index >= query.rays {
-        return;
-    }
-    let ray = rays[index];
+fn answer(index: u32, ray: Ray) -> Found {
     let tiny = select(vec3f(1e-20), vec3f(-1e-20), ray.dir < vec3f(0.0));
     let inverse = 1.0 / select(ray.dir, tiny, abs(ray.dir) < vec3f(1e-20));
     var best = Best(Verdict(MISS, FAR, FAR), NONE, FAR);
@@ -99,6 +92,5 @@ fn trace_tree(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) grou
             held += 1u;
         }
     }
-    let t = 0.5 * (best.verdict.low + best.verdict.high);
-    found[index] = Found(t, best.prim, state_of(best), opened, 0u, 0u, tests, 0u);
+    return told(best, vec3u(opened, 0u, 0u), tests);
 }

@@ -7,20 +7,17 @@
 //! divided by 16, a million; trees in which more than 96 children can wait at a time are refused.
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use bytemuck::{Pod, Zeroable};
-use rayward_trace::ldc::{CubeFrame, Hierarchy};
+use rayward_trace::ldc::CubeFrame;
 use rayward_trace::{Accel, Bvh, BvhNode, Hit, Light, Ray, Receiver, SurfaceRay, Triangles};
 use wgpu::Buffer;
 
 use crate::batch::{Structure, SurfaceHit, Traced};
-use crate::ldc::build::{layout, upload, usable};
+use crate::ldc::build::{Placed, usable};
 use crate::ldc::shaders::TREE;
-use crate::{CubeOptions, Error, Gpu, Result, TraceStats};
-
-/// Resolution of the coordinates: so many texels along the longest side.
-const RESOLUTION: u32 = 1024;
+use crate::{Error, Gpu, Result, TraceStats};
 
 /// `STACK` of `bvh.wgsl`.
 const STACK: usize = 96;
@@ -74,11 +71,8 @@ impl Node {
 pub struct GpuBvh<'a> {
     gpu: &'a Gpu,
     triangles: Triangles<'a>,
-    frame: CubeFrame,
+    placed: Placed,
     empty: bool,
-    layout: Buffer,
-    positions: Buffer,
-    indices: Buffer,
     nodes: Buffer,
     leaves: Buffer,
 }
@@ -90,7 +84,6 @@ impl<'a> GpuBvh<'a> {
     /// [`Error::Limits`], if it does not fit a binding or is too deep; those of the device.
     pub fn new(gpu: &'a Gpu, triangles: Triangles<'a>, bvh: &Bvh) -> Result<Self> {
         let (prims, _) = usable(&triangles);
-        let frame = CubeFrame::around(&triangles, &prims, RESOLUTION);
         if bvh.stack() > STACK {
             return Err(Error::Limits {
                 adapter: gpu.name(),
@@ -99,13 +92,12 @@ impl<'a> GpuBvh<'a> {
                 limit: STACK as u64,
             });
         }
-        let options = CubeOptions {
-            hierarchy: Hierarchy::Flat,
-            ..CubeOptions::default()
-        };
-        let (layout, _) = layout(&frame, triangles.len(), &options);
-        let [positions, indices] = upload(gpu, &frame, &triangles, &prims)?;
-        let mut nodes: Vec<Node> = bvh.nodes().iter().map(|node| Node::of(node, &frame)).collect();
+        let placed = Placed::new(gpu, &triangles, &prims)?;
+        let mut nodes: Vec<Node> = bvh
+            .nodes()
+            .iter()
+            .map(|node| Node::of(node, &placed.frame))
+            .collect();
         let empty = nodes.is_empty();
         // A binding has room for one node at least.
         nodes.resize(nodes.len().max(1), Node::zeroed());
@@ -113,11 +105,8 @@ impl<'a> GpuBvh<'a> {
         Ok(Self {
             gpu,
             triangles,
-            frame,
+            placed,
             empty,
-            layout: gpu.uniform("the frame of coordinates", &layout)?,
-            positions,
-            indices,
             nodes: gpu.uploaded("nodes of the hierarchy", &nodes)?,
             leaves: gpu.uploaded("leaves of the hierarchy", &leaves)?,
         })
@@ -125,8 +114,7 @@ impl<'a> GpuBvh<'a> {
 
     /// Memory on the device in bytes, triangles included.
     pub fn bytes(&self) -> u64 {
-        let buffers = [&self.positions, &self.indices, &self.nodes, &self.leaves];
-        buffers.map(Buffer::size).iter().sum()
+        self.placed.bytes() + self.nodes.size() + self.leaves.size()
     }
 
     /// [`crate::Cube::closest`].
@@ -158,24 +146,19 @@ impl<'a> GpuBvh<'a> {
     }
 
     fn traced(&self) -> Traced<'_> {
+        let mut bindings = self.placed.bindings().to_vec();
+        bindings.extend([(3, &self.nodes), (4, &self.leaves)]);
         let tree = Structure {
-            frame: self.frame,
+            frame: self.placed.frame,
             empty: self.empty,
             complete: true,
-            bindings: vec![
-                (0, &self.layout),
-                (1, &self.positions),
-                (2, &self.indices),
-                (3, &self.nodes),
-                (4, &self.leaves),
-            ],
+            bindings,
             placing: None,
         };
         Traced {
             gpu: self.gpu,
             triangles: self.triangles,
             program: &TREE,
-            entry: "trace_tree",
             structures: vec![tree],
         }
     }

@@ -6,7 +6,7 @@ use super::GpuBvh;
 use crate::tests::{Mesh, gpu, meshes, rays};
 
 /// One that knows nothing: every answer that is left is the device's own.
-struct Silent;
+pub(crate) struct Silent;
 
 impl Accel for Silent {
     fn intersect(&self, _: &Ray) -> Option<Hit> {

@@ -13,14 +13,7 @@ struct Place {
 @group(0) @binding(4) var<storage, read> entries: array<vec2u>;
 @group(0) @binding(9) var<storage, read> places: array<Place>;
 
-@compute @workgroup_size(64)
-fn look(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-        @builtin(local_invocation_index) local: u32) {
-    let index = thread_index(group, groups, local, 64u);
-    if index >= query.rays {
-        return;
-    }
-    let ray = rays[index];
+fn answer(index: u32, ray: Ray) -> Found {
     let place = places[index];
     var best = Best(Verdict(MISS, FAR, FAR), NONE, FAR);
     var tests = 0u;
@@ -44,6 +37,5 @@ fn look(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
             improve(&best, meet(ray, entry.x, clamp(t, 0.0, ray.end)), entry.x);
         }
     }
-    let t = 0.5 * (best.verdict.low + best.verdict.high);
-    found[index] = Found(t, best.prim, state_of(best), 1u, 0u, looked, tests, 0u);
+    return told(best, vec3u(1u, 0u, looked), tests);
 }

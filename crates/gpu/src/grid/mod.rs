@@ -14,19 +14,15 @@ mod plates;
 mod tests;
 
 use bytemuck::{Pod, Zeroable};
-use rayward_trace::ldc::{CubeFrame, Hierarchy};
 use rayward_trace::{Accel, Bvh, Light, Receiver, Triangles, View, ViewRay, views_of_light};
 use wgpu::Buffer;
 
 use crate::batch::{Structure, Traced};
-use crate::ldc::build::{groups, layout, upload, usable};
+use crate::ldc::build::{Placed, groups, usable};
 use crate::ldc::shaders::{GRID, LOOK};
-use crate::{CubeOptions, Error, Gpu, Result, TraceStats};
+use crate::{Error, Gpu, Result, TraceStats};
 pub(crate) use plates::Plate;
 use plates::plates;
-
-/// Resolution of the coordinates in which triangles are tested: so many texels along the longest side.
-const RESOLUTION: u32 = 1024;
 
 /// Pixels of a cell's side in a camera's grid.
 const PIXELS: u32 = 4;
@@ -64,10 +60,7 @@ pub struct GridGeometry<'a> {
     gpu: &'a Gpu,
     triangles: Triangles<'a>,
     prims: Vec<u32>,
-    frame: CubeFrame,
-    layout: Buffer,
-    positions: Buffer,
-    indices: Buffer,
+    placed: Placed,
 }
 
 impl<'a> GridGeometry<'a> {
@@ -77,21 +70,11 @@ impl<'a> GridGeometry<'a> {
     /// Those of the device.
     pub fn new(gpu: &'a Gpu, triangles: Triangles<'a>) -> Result<Self> {
         let (prims, _) = usable(&triangles);
-        let frame = CubeFrame::around(&triangles, &prims, RESOLUTION);
-        let options = CubeOptions {
-            hierarchy: Hierarchy::Flat,
-            ..CubeOptions::default()
-        };
-        let (layout, _) = layout(&frame, triangles.len(), &options);
-        let [positions, indices] = upload(gpu, &frame, &triangles, &prims)?;
         Ok(Self {
-            layout: gpu.uniform("the frame of coordinates", &layout)?,
+            placed: Placed::new(gpu, &triangles, &prims)?,
             gpu,
             triangles,
             prims,
-            frame,
-            positions,
-            indices,
         })
     }
 }
@@ -287,24 +270,19 @@ impl<'a> GpuGrid<'a> {
 
     fn traced<'c>(&'c self, placing: &'c crate::batch::Placing<'c>) -> Traced<'c> {
         let geometry = self.geometry;
+        let mut bindings = geometry.placed.bindings().to_vec();
+        bindings.extend([(3, &self.starts), (4, &self.entries)]);
         let grid = Structure {
-            frame: geometry.frame,
+            frame: geometry.placed.frame,
             empty: geometry.prims.is_empty() || self.faces.is_empty(),
             complete: true,
-            bindings: vec![
-                (0, &geometry.layout),
-                (1, &geometry.positions),
-                (2, &geometry.indices),
-                (3, &self.starts),
-                (4, &self.entries),
-            ],
+            bindings,
             placing: Some(placing),
         };
         Traced {
             gpu: geometry.gpu,
             triangles: geometry.triangles,
             program: &LOOK,
-            entry: "look",
             structures: vec![grid],
         }
     }

@@ -1,25 +1,30 @@
 //! Building the cube: `raster.wgsl`, `scan.wgsl`, `sort.wgsl`, `peel.wgsl`, `levels.wgsl` in turn.
 //!
-//! Vertices are turned into texel coordinates in f64 here and rounded once; all that shaders do is in those.
+//! Vertices are turned into texel coordinates in f64 here and rounded once, unless they are on the device already
+//! (`skin/`); all that shaders do is in those.
 
 use std::sync::Arc;
 
 use rayon::prelude::*;
-use rayward_trace::ldc::{Coverage, CubeFrame, Hierarchy, LdcBuild, TILE};
+use rayward_trace::ldc::{Coverage, CubeFrame, DepthFormat, Hierarchy, LdcBuild, TILE};
 use rayward_trace::{BuildStats, Triangles};
 use wgpu::Buffer;
 
 use super::layout::{Frame, Raise};
-use super::shaders::{LEVELS, RASTER, SORT};
+use super::shaders::{LEVELS, PACK, RASTER, SORT};
 use super::{Buffers, Cube, CubeOptions, Stacks};
-use crate::{Error, Gpu, Result};
+use crate::{Error, Gpu, PosedVertices, Result};
 
 const LEAST_RESOLUTION: u32 = 16;
 const MAX_RESOLUTION: u32 = 2048;
 /// Rows of all triangles together, at most.
 const MAX_ROWS: f64 = (1u64 << 28) as f64;
-/// Bytes of a sample.
+/// Bytes of a sample while it is built, and with sixteen bits of depth.
 const SAMPLE: u64 = 12;
+const PACKED: u64 = 8;
+/// `doubt` of `common.wgsl`, for corners that came from f64 and for corners that the device has turned itself.
+const DOUBT: f32 = 64.0;
+const DEVICE_DOUBT: f32 = 96.0;
 /// Threads of a workgroup of the shaders dispatched by [`groups`].
 const GROUP: u64 = 64;
 /// Workgroups for so many threads.
@@ -35,7 +40,31 @@ impl<'a> Cube<'a> {
         Ok(Self {
             gpu,
             triangles,
-            stacks: vec![Arc::new(Stacks::build(gpu, &triangles, &prims, options)?)],
+            stacks: vec![Arc::new(Stacks::build(gpu, &triangles, &prims, options, None)?)],
+            rebuilt: stats.triangles,
+            stats,
+        })
+    }
+
+    /// [`Cube::build`] over triangles of these vertices, which come from where they were posed.
+    ///
+    /// # Errors
+    /// As [`Cube::build`].
+    ///
+    /// # Panics
+    /// If an index is beyond the last vertex.
+    pub fn build_posed(
+        posed: &'a PosedVertices<'a>,
+        indices: &'a [[u32; 3]],
+        options: &CubeOptions,
+    ) -> Result<Self> {
+        let (gpu, triangles) = (posed.gpu(), posed.triangles(indices));
+        let (prims, stats) = usable(&triangles);
+        let stacks = Stacks::build(gpu, &triangles, &prims, options, Some(posed))?;
+        Ok(Self {
+            gpu,
+            triangles,
+            stacks: vec![Arc::new(stacks)],
             rebuilt: stats.triangles,
             stats,
         })
@@ -43,22 +72,29 @@ impl<'a> Cube<'a> {
 }
 
 impl Stacks {
-    /// Builds over these triangles.
+    /// Builds over these triangles, of vertices that are on the device already if they were posed there.
     pub(crate) fn build(
         gpu: &Gpu,
         triangles: &Triangles,
         prims: &[u32],
         options: &CubeOptions,
+        posed: Option<&PosedVertices>,
     ) -> Result<Self> {
         let most = options.max_samples.min(gpu.largest_binding() / SAMPLE);
         let mut resolution = options.resolution.clamp(LEAST_RESOLUTION, MAX_RESOLUTION);
         loop {
             let last = resolution <= LEAST_RESOLUTION;
-            let frame = CubeFrame::around(triangles, prims, resolution);
+            let around = CubeFrame::around(triangles, prims, resolution);
+            let snapped = posed.and_then(|posed| Some((posed, PosedVertices::frame(&around)?)));
+            let frame = snapped.map_or(around, |(_, frame)| frame);
             let size = Size::estimate(&frame, triangles, prims);
             // Estimates are rather high; the count on the device decides.
             if last || (size.rows <= MAX_ROWS && size.samples <= 4.0 * most as f64) {
-                let stage = Stage::new(gpu, &frame, triangles, options, prims, size)?;
+                let vertices = match snapped {
+                    Some((posed, frame)) => (posed.texels(&frame)?, DEVICE_DOUBT),
+                    None => (texels(gpu, &frame, triangles)?, DOUBT),
+                };
+                let stage = Stage::new(gpu, &frame, triangles, options, prims, size, vertices)?;
                 let (samples, layers) = stage.count()?;
                 if samples <= most {
                     return stage.finish(frame, options, samples, layers);
@@ -119,7 +155,7 @@ impl Size {
     }
 }
 
-pub(crate) fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions) -> (Frame, u64) {
+fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions) -> (Frame, u64) {
     let raster = |axis: usize| [frame.size[(axis + 1) % 3], frame.size[(axis + 2) % 3]];
     let shifts: Vec<[u32; 2]> = match options.hierarchy {
         Hierarchy::Flat => Vec::new(),
@@ -146,31 +182,76 @@ pub(crate) fn layout(frame: &CubeFrame, triangles: usize, options: &CubeOptions)
         levels: shifts.len() as u32,
         conservative: u32::from(conservative),
         occupancy: u32::from(options.hierarchy == Hierarchy::Pyramid),
-        pad: 0,
+        doubt: DOUBT,
+        // As `common.wgsl` counts them.
+        depth: match options.depth {
+            DepthFormat::F32 => 0,
+            DepthFormat::U16 => 1,
+            DepthFormat::F16 => 2,
+        },
+        pad_a: 0,
+        pad_b: 0,
+        pad_c: 0,
         cells,
     };
     (layout, u64::from(first_cell))
 }
 
-/// Vertices in texel coordinates, and the corners of all triangles.
-pub(crate) fn upload(
-    gpu: &Gpu,
-    frame: &CubeFrame,
-    triangles: &Triangles,
-    prims: &[u32],
-) -> Result<[Buffer; 2]> {
+/// Triangles on the device in the coordinates of a cube that is not built: what structures that test triangles as the cube
+/// does have in common.
+#[derive(Debug)]
+pub(crate) struct Placed {
+    pub(crate) frame: CubeFrame,
+    layout: Buffer,
+    positions: Buffer,
+    indices: Buffer,
+}
+
+impl Placed {
+    /// Texels along the longest side.
+    const RESOLUTION: u32 = 1024;
+
+    pub(crate) fn new(gpu: &Gpu, triangles: &Triangles, prims: &[u32]) -> Result<Self> {
+        let frame = CubeFrame::around(triangles, prims, Self::RESOLUTION);
+        let options = CubeOptions {
+            hierarchy: Hierarchy::Flat,
+            ..CubeOptions::default()
+        };
+        let (layout, _) = layout(&frame, triangles.len(), &options);
+        Ok(Self {
+            frame,
+            layout: gpu.uniform("the frame of coordinates", &layout)?,
+            positions: texels(gpu, &frame, triangles)?,
+            indices: corners(gpu, triangles, prims)?,
+        })
+    }
+
+    /// What `meet.wgsl` needs.
+    pub(crate) fn bindings(&self) -> [(u32, &Buffer); 3] {
+        [(0, &self.layout), (1, &self.positions), (2, &self.indices)]
+    }
+
+    pub(crate) fn bytes(&self) -> u64 {
+        self.positions.size() + self.indices.size()
+    }
+}
+
+/// Vertices in texel coordinates.
+fn texels(gpu: &Gpu, frame: &CubeFrame, triangles: &Triangles) -> Result<Buffer> {
     let positions: Vec<[f32; 3]> = (0..triangles.x.len() as u32)
         .into_par_iter()
         .map(|i| frame.texel(triangles.vertex(i).as_dvec3()).as_vec3().to_array())
         .collect();
+    gpu.uploaded("vertices", &positions)
+}
+
+/// The corners of all triangles that take part.
+fn corners(gpu: &Gpu, triangles: &Triangles, prims: &[u32]) -> Result<Buffer> {
     let mut indices = vec![[u32::MAX; 3]; triangles.len()];
     for &prim in prims {
         indices[prim as usize] = triangles.indices[prim as usize];
     }
-    Ok([
-        gpu.uploaded("vertices", &positions)?,
-        gpu.uploaded("triangles", &indices)?,
-    ])
+    gpu.uploaded("triangles", &indices)
 }
 
 /// A build at one resolution, under way.
@@ -195,6 +276,7 @@ impl<'a> Stage<'a> {
         options: &CubeOptions,
         prims: &[u32],
         size: Size,
+        (positions, doubt): (Buffer, f32),
     ) -> Result<Self> {
         if size.rows > MAX_ROWS {
             return Err(Error::Limits {
@@ -204,8 +286,9 @@ impl<'a> Stage<'a> {
                 limit: MAX_ROWS as u64,
             });
         }
-        let [positions, indices] = upload(gpu, frame, triangles, prims)?;
+        let indices = corners(gpu, triangles, prims)?;
         let (layout, cells) = layout(frame, triangles.len(), options);
+        let layout = Frame { doubt, ..layout };
         let texels = u64::from(layout.first_texel[3]);
         Ok(Self {
             gpu,
@@ -258,10 +341,15 @@ impl<'a> Stage<'a> {
                 self.raise(&cells, axis, level - 1)?;
             }
         }
+        let samples = match options.depth {
+            DepthFormat::F32 => samples,
+            DepthFormat::U16 | DepthFormat::F16 => self.packed(&samples, count)?,
+        };
         self.gpu.wait()?;
         Ok(Stacks {
             frame,
             layout: self.layout,
+            depth: options.depth,
             samples: count,
             layers,
             complete: self.layout.conservative == 1,
@@ -290,6 +378,15 @@ impl<'a> Stage<'a> {
         self.gpu.dispatch(&RASTER, "fill", &bindings, groups(self.rows))?;
         let bindings = [(0, &self.frame), (1, &self.starts), (2, samples)];
         self.gpu.dispatch(&SORT, "sort", &bindings, groups(self.texels()))
+    }
+
+    /// The samples with sixteen bits of depth.
+    fn packed(&self, samples: &Buffer, count: u64) -> Result<Buffer> {
+        let packed = self.gpu.storage("the cube's packed samples", PACKED * count)?;
+        let bindings = [(0, &self.frame), (1, &self.starts), (2, samples), (3, &packed)];
+        self.gpu
+            .dispatch(&PACK, "pack", &bindings, groups(self.texels()))?;
+        Ok(packed)
     }
 
     /// A pass for each layer.

@@ -13,7 +13,13 @@ struct Frame {
     conservative: u32,
     // 1 if cells tell which 64ths of the depth are occupied.
     occupancy: u32,
-    pad: u32,
+    // Error of a triangle's test, in ulp of its corners' distance times the cube's size.
+    doubt: f32,
+    // How depths are stored: F32_DEPTH, U16_DEPTH or F16_DEPTH.
+    depth: u32,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
     // At 3 * axis + level: first cell, cells in a row, texels of a cell's sides as powers of two.
     cells: array<vec4u, 9>,
 }
@@ -28,8 +34,12 @@ const REACH: f32 = 0.00390625;
 const ULP: f32 = 5.9604645e-8;
 // Slopes of a sample without a plane.
 const NO_PLANE: u32 = 0x8080u;
-// Three words a sample: triangle, depth, slopes.
+// Three words a sample: triangle, depth, slopes. Packed two: triangle, and slopes below sixteen bits of depth.
 const SAMPLE: u32 = 3u;
+const PACKED: u32 = 2u;
+const F32_DEPTH: u32 = 0u;
+const U16_DEPTH: u32 = 1u;
+const F16_DEPTH: u32 = 2u;
 
 // A point as (u, v, w) of a direction.
 fn turned(p: vec3f, axis: u32) -> vec3f {
@@ -44,6 +54,15 @@ fn raster_size(axis: u32) -> vec2u {
 fn texel_index(axis: u32, column: u32, row: u32) -> u32 {
     let tile = (row / TILE) * (raster_size(axis).x / TILE) + column / TILE;
     return frame.first_texel[axis] + tile * TILE * TILE + (row % TILE) * TILE + column % TILE;
+}
+
+// Bound on the error of a stored depth, in texels; conversions to f16 may round either way.
+fn depth_error(axis: u32) -> f32 {
+    let scale = f32(frame.size[axis]);
+    if frame.depth == U16_DEPTH {
+        return scale * (0.51 / 65535.0) + 0.015625;
+    }
+    return select(0.0, scale / 2048.0, frame.depth == F16_DEPTH);
 }
 
 // A number as an integer of the same order, and back. 0 is below all numbers.

@@ -13,14 +13,7 @@ fn seen(mailbox: ptr<function, vec4u>, prim: u32) -> bool {
     return false;
 }
 
-@compute @workgroup_size(64)
-fn trace_exact(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-               @builtin(local_invocation_index) local: u32) {
-    let index = thread_index(group, groups, local, 64u);
-    if index >= query.rays {
-        return;
-    }
-    let ray = rays[index];
+fn answer(index: u32, ray: Ray) -> Found {
     let order = axis_order(ray.dir);
     var best = Best(Verdict(MISS, FAR, FAR), NONE, FAR);
     var mailbox = vec4u(NONE);
@@ -29,13 +22,15 @@ fn trace_exact(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
     var t_end = ray.end;
     for (var i = 0u; i < 3u && !settled(best); i++) {
         var w = walk_start(ray, order[i], steps);
+        let slack = PLANE_SLACK + depth_error(order[i]);
         while !settled(best) && walk_next(&w, t_end, REACH) {
             for (var s = w.first; s < w.last; s++) {
-                let id = samples[SAMPLE * s];
-                let slopes = samples[SAMPLE * s + 2u];
-                let off = above(w, bitcast<f32>(samples[SAMPLE * s + 1u]), slopes_of(slopes));
-                let passes = min(off.x, off.y) > PLANE_SLACK || max(off.x, off.y) < -PLANE_SLACK;
-                if id == ray.skip || id == best.prim || (passes && slopes != NO_PLANE) || seen(&mailbox, id) {
+                let sample = sample_at(s, order[i]);
+                let id = sample.id;
+                let off = above(w, sample.depth, slopes_of(sample.slopes));
+                let passes = min(off.x, off.y) > slack || max(off.x, off.y) < -slack;
+                let crossed = !passes || sample.slopes == NO_PLANE;
+                if id == ray.skip || id == best.prim || !crossed || seen(&mailbox, id) {
                     continue;
                 }
                 tests += 1u;
@@ -46,6 +41,5 @@ fn trace_exact(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) gro
         }
         steps = w.steps;
     }
-    let t = 0.5 * (best.verdict.low + best.verdict.high);
-    found[index] = Found(t, best.prim, state_of(best), steps.x, steps.y, steps.z, tests, 0u);
+    return told(best, steps, tests);
 }

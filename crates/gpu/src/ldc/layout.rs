@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 /// The cube's layout: `Frame` of `common.wgsl`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Frame {
     pub(crate) size: [u32; 3],
@@ -12,7 +12,11 @@ pub(crate) struct Frame {
     pub(crate) levels: u32,
     pub(crate) conservative: u32,
     pub(crate) occupancy: u32,
-    pub(crate) pad: u32,
+    pub(crate) doubt: f32,
+    pub(crate) depth: u32,
+    pub(crate) pad_a: u32,
+    pub(crate) pad_b: u32,
+    pub(crate) pad_c: u32,
     pub(crate) cells: [[u32; 4]; 9],
 }
 

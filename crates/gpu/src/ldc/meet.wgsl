@@ -3,8 +3,10 @@
 // With u = 2^-24 and a cube of S texels, corners and the ray's point are known to 5 u S in texel coordinates. Relative
 // to that point the edge functions are `d . (a x b)` with |d| <= 1 in each component and |a|, |b| <= A, so they are
 // known to 12 A (5 u S + u A) for the positions, 6 u A^2 for the direction and 42 u A^2 for the sums: within
-// 64 u A (S + A). A hit's parameter follows from them as weights of the corners' parameters. The definition of the
-// answer, `trace::exact`, has its own error of 2^-22 of the parameter from the ray's true origin.
+// 64 u A (S + A). Corners that the device itself has turned into coordinates are known to 3 u S instead of u S, which
+// makes it 12 A (7 u S + u A): within 96 u A (S + A). `frame.doubt` is 64 or 96. A hit's parameter follows from them as
+// weights of the corners' parameters. The definition of the answer, `trace::exact`, has its own error of 2^-22 of the
+// parameter from the ray's true origin.
 
 @group(0) @binding(1) var<storage, read> positions: array<f32>;
 @group(0) @binding(2) var<storage, read> indices: array<u32>;
@@ -29,7 +31,7 @@ fn meet(ray: Ray, prim: u32, t: f32) -> Verdict {
     let m = max(max(abs(a), abs(b)), abs(c));
     let reach = max(max(m.x, m.y), m.z);
     let size = f32(max(max(frame.size.x, frame.size.y), frame.size.z)) + reach;
-    let error = 64.0 * ULP * reach * size + 1e-30;
+    let error = frame.doubt * ULP * reach * size + 1e-30;
     let e = vec3f(dot(ray.dir, cross(b, c)), dot(ray.dir, cross(c, a)), dot(ray.dir, cross(a, b)));
     let low = min(min(e.x, e.y), e.z);
     let high = max(max(e.x, e.y), e.z);
@@ -39,7 +41,7 @@ fn meet(ray: Ray, prim: u32, t: f32) -> Verdict {
     let q = vec3f(dot(ray.dir, a), dot(ray.dir, b), dot(ray.dir, c)) / dot(ray.dir, ray.dir);
     let q_low = min(min(q.x, q.y), q.z);
     let q_high = max(max(q.x, q.y), q.z);
-    let slack = 32.0 * ULP * size + 5.0 * ULP * (ray.before + t + reach);
+    let slack = 0.5 * frame.doubt * ULP * size + 5.0 * ULP * (ray.before + t + reach);
     let sum = abs(e.x + e.y + e.z);
     if (low <= error && high >= -error) || sum <= 6.0 * error {
         return within(ray, UNSURE, vec2f(t + q_low, t + q_high), slack);
@@ -94,3 +96,8 @@ fn state_of(best: Best) -> u32 {
     return select(best.verdict.state, UNSURE, rivalled);
 }
 
+// What is found of a ray.
+fn told(best: Best, steps: vec3u, tests: u32) -> Found {
+    let t = 0.5 * (best.verdict.low + best.verdict.high);
+    return Found(t, best.prim, state_of(best), steps.x, steps.y, steps.z, tests, 0u);
+}

@@ -6,7 +6,7 @@
 //! texel sorts its few by depth and id, so that the order of threads leaves no trace. Peeling is there for comparison
 //! (`CubeOptions::build`).
 //!
-//! Layout: 4 bytes a texel, 12 a sample (id, depth, slopes), 16 a cell, 12 a triangle and 12 a vertex. The samples'
+//! Layout: 4 bytes a texel, 12 a sample (id, depth, slopes; 8 with 16 bits of depth, once it is built), 16 a cell, 12 a triangle and 12 a vertex. The samples'
 //! 128 MiB binding allows 11 million of them; a scene that would have more gets a cube of half the resolution, a
 //! quarter and so on. Cost: a sweep costs what its samples do; a ray some hundred steps. Limits: resolution up to
 //! 2048, where f32 texel coordinates still resolve 1/8192 of a texel.
@@ -21,9 +21,11 @@ mod trace;
 
 use std::sync::Arc;
 
-pub(crate) use still::StillCube;
+use half::f16;
 
-use rayward_trace::ldc::{Coverage, CubeFrame, Hierarchy, LdcBuild, StepCounts, TexelSample};
+pub use still::StillCube;
+
+use rayward_trace::ldc::{Coverage, CubeFrame, DepthFormat, Hierarchy, LdcBuild, StepCounts, TexelSample};
 use rayward_trace::{BuildStats, Triangles};
 use wgpu::Buffer;
 
@@ -36,6 +38,8 @@ pub struct CubeOptions {
     pub resolution: u32,
     /// How samples are made.
     pub build: LdcBuild,
+    /// How their depth is stored.
+    pub depth: DepthFormat,
     /// What lies above the texels.
     pub hierarchy: Hierarchy,
     /// The resolution is halved until there are no more samples than this, nor than fit a binding.
@@ -47,6 +51,7 @@ impl Default for CubeOptions {
         Self {
             resolution: 512,
             build: LdcBuild::Csr(Coverage::Conservative),
+            depth: DepthFormat::F32,
             hierarchy: Hierarchy::Pyramid,
             max_samples: 1 << 26,
         }
@@ -71,6 +76,7 @@ pub struct Cube<'a> {
 pub(crate) struct Stacks {
     frame: CubeFrame,
     layout: layout::Frame,
+    depth: DepthFormat,
     /// Samples of all directions, those that equal depths have left over included.
     samples: u64,
     layers: u32,
@@ -98,6 +104,23 @@ pub struct TraceStats {
     pub unsure: usize,
     /// Steps of all rays on the GPU.
     pub steps: StepCounts,
+}
+
+impl Stacks {
+    /// Samples of one direction as three words, as they were before they were packed but for the depth's bits.
+    fn unpacked(&self, gpu: &Gpu, [from, to]: [u64; 2], axis: usize) -> Result<Vec<[u32; 3]>> {
+        let scale = self.layout.size[axis] as f32;
+        let share = |bits: u32| match self.depth {
+            DepthFormat::F16 => f16::from_bits((bits >> 16) as u16).to_f32(),
+            _ => (bits >> 16) as f32 / f32::from(u16::MAX),
+        };
+        if self.depth == DepthFormat::F32 {
+            return gpu.read(&self.buffers.samples, from, to - from);
+        }
+        let packed: Vec<[u32; 2]> = gpu.read(&self.buffers.samples, from, to - from)?;
+        let one = |[prim, bits]: [u32; 2]| [prim, (share(bits) * scale).to_bits(), bits & 0xffff];
+        Ok(packed.into_iter().map(one).collect())
+    }
 }
 
 impl Buffers {
@@ -153,11 +176,12 @@ impl Cube<'_> {
 
     /// All samples of one direction, by texel in memory order, then by depth; of the first cube if there are two.
     pub fn texel_samples(&self, axis: usize) -> Result<Vec<TexelSample>> {
-        let Stacks { layout, buffers, .. } = &*self.stacks[0];
+        let stacks = &self.stacks[0];
+        let Stacks { layout, buffers, .. } = &**stacks;
         let [first, end] = [0, 1].map(|i| u64::from(layout.first_texel[axis + i]));
         let starts: Vec<u32> = self.gpu.read(&buffers.starts, first, end - first + 1)?;
         let (from, to) = (u64::from(starts[0]), u64::from(starts[starts.len() - 1]));
-        let samples: Vec<[u32; 3]> = self.gpu.read(&buffers.samples, from, to - from)?;
+        let samples = stacks.unpacked(self.gpu, [from, to], axis)?;
         let mut all = Vec::with_capacity(samples.len());
         for (texel, range) in starts.windows(2).enumerate() {
             let [a, b] = [range[0] - starts[0], range[1] - starts[0]].map(|i| i as usize);

@@ -72,7 +72,8 @@ fn bound(r: Routed, column: u32, row: u32) {
     if !r.has_plane {
         range = r.depth;
     }
-    range += vec2f(-REACH, REACH);
+    let error = REACH + depth_error(r.axis);
+    range += vec2f(-error, error);
     let occupied = slots(range.x, range.y, 64.0 / f32(frame.size[r.axis]));
     atomicMax(&cells[cell], ~key(range.x));
     atomicMax(&cells[cell + 1u], key(range.y));

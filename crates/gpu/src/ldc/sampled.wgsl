@@ -33,14 +33,7 @@ fn sample_hit(w: Walk, depth: f32, slopes: vec2f, lateral: f32) -> f32 {
     return select(FAR, t, t >= w.ends.x - slack && t <= w.ends.y + slack);
 }
 
-@compute @workgroup_size(64)
-fn trace_sampled(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-                 @builtin(local_invocation_index) local: u32) {
-    let index = thread_index(group, groups, local, 64u);
-    if index >= query.rays {
-        return;
-    }
-    let ray = rays[index];
+fn answer(index: u32, ray: Ray) -> Found {
     // A plane's slopes are at most 1 either way.
     let pad = query.tolerance * select(1.0, 2.0, query.test == PLANE);
     let order = axis_order(ray.dir);
@@ -55,12 +48,12 @@ fn trace_sampled(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
         var own_prim = NONE;
         while own == FAR && walk_next(&w, t_end, pad) {
             for (var s = w.first; s < w.last; s++) {
-                let id = samples[SAMPLE * s];
+                let sample = sample_at(s, order[i]);
+                let id = sample.id;
                 if id == NONE {
                     break;
                 }
-                let slopes = slopes_of(samples[SAMPLE * s + 2u]);
-                let t = sample_hit(w, bitcast<f32>(samples[SAMPLE * s + 1u]), slopes, lateral);
+                let t = sample_hit(w, sample.depth, slopes_of(sample.slopes), lateral);
                 let counts = t < FAR && t > ray.t_min && t <= ray.t_max && id != ray.skip;
                 if counts && (t < own || (t == own && id < own_prim)) {
                     own = t;
@@ -78,5 +71,5 @@ fn trace_sampled(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) g
             break;
         }
     }
-    found[index] = Found(best, prim, select(HIT, MISS, prim == NONE), steps.x, steps.y, steps.z, 0u, 0u);
+    return Found(best, prim, select(HIT, MISS, prim == NONE), steps.x, steps.y, steps.z, 0u, 0u);
 }

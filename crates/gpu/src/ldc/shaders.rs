@@ -31,6 +31,11 @@ pub(crate) const SORT: Program = Program {
     ),
 };
 
+pub(crate) const PACK: Program = Program {
+    name: "pack.wgsl",
+    source: concat!(include_str!("common.wgsl"), include_str!("pack.wgsl")),
+};
+
 pub(crate) const LEVELS: Program = Program {
     name: "levels.wgsl",
     source: concat!(include_str!("common.wgsl"), include_str!("levels.wgsl")),
@@ -43,6 +48,7 @@ pub(crate) const SAMPLED: Program = Program {
         include_str!("query.wgsl"),
         include_str!("walk.wgsl"),
         include_str!("sampled.wgsl"),
+        include_str!("entry.wgsl"),
     ),
 };
 
@@ -54,6 +60,7 @@ pub(crate) const EXACT: Program = Program {
         include_str!("meet.wgsl"),
         include_str!("walk.wgsl"),
         include_str!("exact.wgsl"),
+        include_str!("entry.wgsl"),
     ),
 };
 
@@ -64,6 +71,7 @@ pub(crate) const TREE: Program = Program {
         include_str!("query.wgsl"),
         include_str!("meet.wgsl"),
         include_str!("../bvh/bvh.wgsl"),
+        include_str!("entry.wgsl"),
     ),
 };
 
@@ -84,13 +92,19 @@ pub(crate) const LOOK: Program = Program {
         include_str!("query.wgsl"),
         include_str!("meet.wgsl"),
         include_str!("../grid/look.wgsl"),
+        include_str!("entry.wgsl"),
     ),
+};
+
+pub(crate) const SKIN: Program = Program {
+    name: "skin.wgsl",
+    source: include_str!("../skin/skin.wgsl"),
 };
 
 /// All programs.
 #[cfg(test)]
-pub(crate) const ALL: [&Program; 9] = [
-    &RASTER, &SCAN, &SORT, &LEVELS, &SAMPLED, &EXACT, &TREE, &GRID, &LOOK,
+pub(crate) const ALL: [&Program; 11] = [
+    &RASTER, &SCAN, &SORT, &PACK, &LEVELS, &SAMPLED, &EXACT, &TREE, &GRID, &LOOK, &SKIN,
 ];
 
 #[cfg(test)]
@@ -103,12 +117,14 @@ mod tests {
     use crate::bvh::Node;
     use crate::grid::{Grid, Place, Plate};
     use crate::ldc::layout::{Found, Frame, Query, Raise, Scan, TexelRay};
+    use crate::skin::{Influence, Skin};
 
     fn parsed(program: &Program) -> (naga::Module, ModuleInfo) {
         let module = naga::front::wgsl::parse_str(program.source)
             .unwrap_or_else(|e| panic!("{}: {}", program.name, e.emit_to_string(program.source)));
-        // No capabilities: plain WebGPU.
-        let info = Validator::new(ValidationFlags::all(), Capabilities::empty())
+        // Plain WebGPU, to which conversions from and to 16 bits belong.
+        let capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
+        let info = Validator::new(ValidationFlags::all(), capabilities)
             .validate(&module)
             .unwrap_or_else(|e| panic!("{}: {}", program.name, e.emit_to_string(program.source)));
         (module, info)
@@ -209,7 +225,11 @@ mod tests {
             levels,
             conservative,
             occupancy,
-            pad,
+            doubt,
+            depth,
+            pad_a,
+            pad_b,
+            pad_c,
             cells
         );
         same_layout!(SCAN, "Scan", Scan, count, blocks, pad);
@@ -222,6 +242,8 @@ mod tests {
             GRID, "Plate", Plate, ax, ay, bx, by, cx, cy, depth, prim, first, row
         );
         same_layout!(LOOK, "Place", Place, cell, depth, rate, pad);
+        same_layout!(SKIN, "Influence", Influence, joints, shares);
+        same_layout!(SKIN, "Skin", Skin, corner, vertices, per_side);
         for program in [SAMPLED, EXACT, TREE, LOOK] {
             same_layout!(
                 program, "Ray", TexelRay, origin, end, dir, t_min, t_max, before, skip, pad

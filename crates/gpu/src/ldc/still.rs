@@ -7,11 +7,11 @@ use rayward_trace::ldc::Stillness;
 
 use super::build::usable;
 use super::{Cube, CubeOptions, Stacks};
-use crate::{Gpu, Result};
+use crate::{Gpu, PosedVertices, Result};
 
 /// Builds the cubes of a row of frames.
 #[derive(Debug, Default)]
-pub(crate) struct StillCube {
+pub struct StillCube {
     stillness: Stillness,
     kept: Option<Arc<Stacks>>,
 }
@@ -22,11 +22,37 @@ impl StillCube {
     ///
     /// # Errors
     /// Those of the device.
-    pub(crate) fn build<'a>(
+    pub fn build<'a>(
         &mut self,
         gpu: &'a Gpu,
         triangles: Triangles<'a>,
         options: &CubeOptions,
+    ) -> Result<Cube<'a>> {
+        self.next(gpu, triangles, options, None)
+    }
+
+    /// The same over triangles of these vertices, which come from where they were posed.
+    ///
+    /// # Errors
+    /// Those of the device.
+    ///
+    /// # Panics
+    /// If an index is beyond the last vertex.
+    pub fn build_posed<'a>(
+        &mut self,
+        posed: &'a PosedVertices<'a>,
+        indices: &'a [[u32; 3]],
+        options: &CubeOptions,
+    ) -> Result<Cube<'a>> {
+        self.next(posed.gpu(), posed.triangles(indices), options, Some(posed))
+    }
+
+    fn next<'a>(
+        &mut self,
+        gpu: &'a Gpu,
+        triangles: Triangles<'a>,
+        options: &CubeOptions,
+        posed: Option<&PosedVertices>,
     ) -> Result<Cube<'a>> {
         let more = self.stillness.follow(&triangles);
         let (prims, stats) = usable(&triangles);
@@ -38,7 +64,7 @@ impl StillCube {
         }
         if !still.is_empty() && self.kept.is_none() {
             rebuilt += still.len();
-            self.kept = Some(Arc::new(Stacks::build(gpu, &triangles, &still, options)?));
+            self.kept = Some(Arc::new(Stacks::build(gpu, &triangles, &still, options, posed)?));
         }
         let mut stacks: Vec<Arc<Stacks>> = self.kept.iter().cloned().collect();
         if !moving.is_empty() || stacks.is_empty() {
@@ -49,7 +75,9 @@ impl StillCube {
                 resolution,
                 ..*options
             };
-            stacks.push(Arc::new(Stacks::build(gpu, &triangles, &moving, &options)?));
+            stacks.push(Arc::new(Stacks::build(
+                gpu, &triangles, &moving, &options, posed,
+            )?));
         }
         Ok(Cube {
             gpu,

@@ -450,3 +450,73 @@ fn a_lost_device_is_one_error() {
     let unknown = Gpu::open(Some("no such adapter")).map(|_| ());
     assert!(matches!(unknown, Err(Error::NoAdapter { .. })), "{unknown:?}");
 }
+
+#[test]
+fn sixteen_bits_of_depth_are_near_and_answers_stay_exact() {
+    let Some(gpu) = gpu() else { return };
+    // Of the cube's size: half a step and depths below 0, a step of numbers above 1/2.
+    for (depth, error) in [
+        (DepthFormat::U16, 0.51 / 65535.0 + 0.016 / 72.0),
+        (DepthFormat::F16, 1.0 / 2048.0),
+    ] {
+        for build in [CENTRE, LdcBuild::Peel, CONSERVATIVE] {
+            for mesh in meshes() {
+                let full = options(build);
+                let packed = CubeOptions { depth, ..full };
+                let [full, cube] = [full, packed].map(|options| built(&gpu, &mesh, &options));
+                assert!(cube.bytes() < full.bytes());
+                for axis in 0..3 {
+                    let (a, b) = (samples(&full, axis), samples(&cube, axis));
+                    let size = cube.frame().size[axis] as f32;
+                    assert_eq!(a.len(), b.len());
+                    let mut rounded = 0;
+                    for (a, b) in a.iter().zip(&b) {
+                        let told = |s: &TexelSample| (s.texel, s.prim, s.slopes);
+                        assert_eq!(told(a), told(b));
+                        let off = (a.depth - b.depth).abs();
+                        let outside = a.depth < 0.0 || a.depth > size;
+                        assert!(off <= error * size || outside, "{depth:?} {a:?} {b:?}");
+                        rounded += usize::from(off > 0.0);
+                    }
+                    assert!(rounded > a.len() / 2, "{rounded} of {}", a.len());
+                }
+                assert_answers_as_the_reference(&cube, &mesh, depth, build);
+            }
+        }
+    }
+}
+
+/// Exact answers of a conservative cube, and those by samples beside the CPU's.
+fn assert_answers_as_the_reference(cube: &Cube, mesh: &Mesh, depth: DepthFormat, build: LdcBuild) {
+    let rays = rays(23, 1000);
+    if build == CONSERVATIVE {
+        let brute = BruteForce::new(mesh.triangles());
+        let (hits, stats) = cube.closest(&rays, &brute).unwrap_or_else(|e| panic!("{e}"));
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert_eq!(*hit, brute.intersect(ray), "{depth:?} {ray:?}");
+        }
+        assert!(stats.unsure < rays.len() / 3, "{stats:?}");
+    }
+    let reference = LdcOptions {
+        depth,
+        ..reference(&options(build))
+    };
+    let ldc = Ldc::build(mesh.triangles(), &reference);
+    for test in [
+        HitTest::Interval { tolerance: 0.5 },
+        HitTest::Plane { margin: 0.25 },
+    ] {
+        let (hits, _) = cube
+            .closest_sampled(&rays, test)
+            .unwrap_or_else(|e| panic!("{e}"));
+        let alike = rays.iter().zip(&hits).filter(|(ray, hit)| {
+            let other = ldc.closest_sampled(ray, test, &mut ());
+            hit.map(|h| h.prim) == other.map(|h| h.prim)
+        });
+        let alike = alike.count();
+        assert!(
+            alike > rays.len() * 96 / 100,
+            "{depth:?} {build:?} {test:?}: {alike}"
+        );
+    }
+}

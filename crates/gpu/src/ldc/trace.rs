@@ -84,7 +84,6 @@ impl Cube<'_> {
         }
         Traced {
             program: &EXACT,
-            entry: "trace_exact",
             ..traced
         }
     }
@@ -94,7 +93,6 @@ impl Cube<'_> {
             gpu: self.gpu,
             triangles: self.triangles,
             program: &SAMPLED,
-            entry: "trace_sampled",
             structures: self.stacks.iter().map(|stacks| structure(stacks)).collect(),
         }
     }

@@ -152,6 +152,25 @@ fn axis_order(dir: vec3f) -> vec3u {
     return order;
 }
 
+// A sample as it was made, but for the depth's bits.
+struct Sample {
+    id: u32,
+    depth: f32,
+    slopes: u32,
+}
+
+fn sample_at(s: u32, axis: u32) -> Sample {
+    if frame.depth == F32_DEPTH {
+        return Sample(samples[SAMPLE * s], bitcast<f32>(samples[SAMPLE * s + 1u]), samples[SAMPLE * s + 2u]);
+    }
+    let bits = samples[PACKED * s + 1u];
+    var share = unpack2x16float(bits).y;
+    if frame.depth == U16_DEPTH {
+        share = f32(bits >> 16u) / 65535.0;
+    }
+    return Sample(samples[PACKED * s], share * f32(frame.size[axis]), bits & 0xffffu);
+}
+
 fn slopes_of(packed: u32) -> vec2f {
     let bytes = vec2i(vec2u(packed << 24u, packed << 16u)) >> vec2u(24u);
     return select(vec2f(bytes) / 127.0, vec2f(0.0), packed == NO_PLANE);

@@ -15,11 +15,14 @@
 
 mod animation;
 mod lights;
+mod motion;
 pub(crate) mod origin;
 mod triangles;
 mod vertices;
 
 use glam::{DMat3, DMat4, DVec3};
+
+pub use motion::ObjectMotion;
 
 use crate::{FrameGeometry, Node, ObjectRange, PosedSolid, Primitive, Scene, Transform};
 
@@ -50,12 +53,7 @@ impl Scene {
     /// # Panics
     /// As [`Scene::at`].
     pub fn at_animation(&self, animation: Option<usize>, time: f32, frame: &mut FrameGeometry) {
-        let mut pose = animation::LocalPose::rest(self);
-        if let Some(animation) = animation.and_then(|i| self.animations.get(i)) {
-            pose.play(animation, time);
-        }
-        let world = world_matrices(&self.nodes, &pose.transforms);
-
+        let (pose, world) = posed_nodes(self, animation, time);
         frame.origin = origin::choose(self);
         let draws = draws(self, &pose, &world);
         vertices::write(&draws, frame);
@@ -80,6 +78,16 @@ impl Scene {
             )
         })
     }
+}
+
+/// Every node's local pose at a time, and its world matrix.
+fn posed_nodes(scene: &Scene, animation: Option<usize>, time: f32) -> (animation::LocalPose, Vec<DMat4>) {
+    let mut pose = animation::LocalPose::rest(scene);
+    if let Some(animation) = animation.and_then(|i| scene.animations.get(i)) {
+        pose.play(animation, time);
+    }
+    let world = world_matrices(&scene.nodes, &pose.transforms);
+    (pose, world)
 }
 
 /// All solids, in node order.

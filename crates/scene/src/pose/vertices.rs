@@ -3,6 +3,7 @@
 use glam::{DMat3, DMat4, DVec3, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
+use super::motion::influences;
 use super::{Draw, Motion, take};
 use crate::{FrameGeometry, MorphTarget};
 
@@ -157,19 +158,13 @@ impl Draw<'_> {
             })
     }
 
-    /// The weighted mean of the joint matrices of vertex `v`. Weights in f32 miss a sum of 1 by some 1e-7, which far
-    /// from the world's zero would be a visible shift.
+    /// The weighted mean of the joint matrices of vertex `v`.
     #[inline]
     fn blend(&self, joints: &[DMat4], v: usize) -> DMat4 {
-        let weights = self.primitive.weights[v].as_dvec4();
-        let total = weights.element_sum();
-        let scale = if total > 0.0 { total.recip() } else { 0.0 };
-        let pairs = self.primitive.joints[v].iter().zip(weights.to_array());
-        pairs
-            .filter(|(_, w)| *w != 0.0)
-            .fold(DMat4::ZERO, |sum, (&j, w)| {
-                sum + joints[usize::from(j)] * (w * scale)
-            })
+        influences(self.primitive, v)
+            .into_iter()
+            .filter(|(_, weight)| *weight != 0.0)
+            .fold(DMat4::ZERO, |sum, (joint, weight)| sum + joints[joint] * weight)
     }
 }
 
