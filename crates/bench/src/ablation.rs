@@ -51,11 +51,11 @@ pub fn measure(
         frames: Vec::new(),
     };
     for kind in FrameKind::ALL {
-        let ways: Vec<Box<Drawer>> = ways(kind)
-            .into_iter()
-            .map(|ways| Box::new(Rayward::new(ways)) as Box<Drawer>)
-            .collect();
         for scene in scenes {
+            let ways: Vec<Box<Drawer>> = ways(kind, scene.geometry.triangle_count())
+                .into_iter()
+                .map(|ways| Box::new(Rayward::new(ways)) as Box<Drawer>)
+                .collect();
             progress(&format!("{}: {}", scene.name, kind.name()));
             let job = Job::new(scene, [options.width, options.height], kind, options.level)?;
             let frame = pool.install(|| measure_frame(&job, &ways, options.runs, &mut |_, _| ()));
@@ -65,14 +65,17 @@ pub fn measure(
     Ok(report)
 }
 
-/// The ways of one kind of frame, the usual one first.
-fn ways(kind: FrameKind) -> Vec<Ways> {
+/// Triangles up to which soft shadows are found through HM08's grid, ray by ray: beyond, one frame takes many minutes.
+pub const MOST_FOLLOWED: usize = 100_000;
+
+/// The ways of one kind of frame of so many triangles, the usual one first.
+fn ways(kind: FrameKind, triangles: usize) -> Vec<Ways> {
     let usual = Ways::usual();
     let mut all = vec![named("all improvements", usual)];
     all.extend(match kind {
         FrameKind::Eye => eye_ways(usual).to_vec(),
         FrameKind::EyeHard => hard_ways(usual).to_vec(),
-        FrameKind::EyeSoft => soft_ways(usual).to_vec(),
+        FrameKind::EyeSoft => soft_ways(usual, triangles),
     });
     let levels = SimdLevel::available();
     let narrower = levels.get(1..).unwrap_or_default().iter();
@@ -147,10 +150,11 @@ fn hard_ways(usual: Ways) -> [Ways; 6] {
     ]
 }
 
-fn soft_ways(usual: Ways) -> [Ways; 2] {
+fn soft_ways(usual: Ways, triangles: usize) -> Vec<Ways> {
     let (sheets, followed) = (false, Some(FaceOptions::paper()));
-    [
-        named("no sheets", Ways { sheets, ..usual }),
-        named("HM08's grid", Ways { followed, ..usual }),
-    ]
+    let mut all = vec![named("no sheets", Ways { sheets, ..usual })];
+    if triangles <= MOST_FOLLOWED {
+        all.push(named("HM08's grid", Ways { followed, ..usual }));
+    }
+    all
 }
