@@ -313,13 +313,7 @@ mod tests {
                 4 => [a, b * 1e-6 + a, c * 1e-6 + a],
                 _ => [Vec3::new(f32::NAN, a.y, a.z), b, c],
             };
-            let first = mesh.x.len() as u32;
-            for corner in corners {
-                mesh.x.push(corner.x);
-                mesh.y.push(corner.y);
-                mesh.z.push(corner.z);
-            }
-            mesh.indices.push([first, first + 1, first + 2]);
+            mesh.triangle(corners);
         }
         mesh
     }
