@@ -7,8 +7,8 @@ use std::f32::consts::FRAC_1_SQRT_2;
 use glam::{DVec3, Mat4, Quat, Vec2, Vec3, Vec4};
 use gltf_builder::{Builder, F32, U8, U16, floats, push};
 use rayward_scene::{
-    AlphaMode, ChannelTarget, Interpolation, LightKind, LoadOptions, Projection, Scene, Transform, UpAxis,
-    Wrap, load,
+    AlphaMode, ChannelTarget, DEFAULT_AMBIENT, Interpolation, LightKind, LoadOptions, Projection, Scene,
+    Transform, UpAxis, Wrap, load,
 };
 use serde_json::json;
 
@@ -250,6 +250,10 @@ fn cameras_and_lights() {
         }
     );
     assert_eq!(scene.lights[1].kind, LightKind::Directional { half_angle: 0.0 });
+    assert_eq!(scene.ambient, Vec3::ZERO);
+    // Lights that stand nowhere light nothing.
+    file.json["nodes"][0]["extensions"] = json!({});
+    assert_eq!(file.load().expect("a sound file").ambient, DEFAULT_AMBIENT);
 }
 
 /// A file with a PNG of two texels as texture 0.
