@@ -25,7 +25,10 @@ pub use defaults::{DEFAULT_AMBIENT, default_camera, default_lights};
 pub use error::{Error, Notice};
 pub use frame::{FrameGeometry, ObjectRange, PosedCamera, PosedLight, VertexAttributes};
 pub use load::{LoadOptions, UpAxis, load};
-pub use material::{AlphaMode, Coat, Image, Material, Sampler, TextureRef, TextureTransform, Wrap};
+pub use material::{
+    AlphaMode, Anisotropy, Coat, Image, Iridescence, Material, Sampler, Sheen, TextureRef, TextureTransform,
+    Wrap,
+};
 pub use pose::ObjectMotion;
 pub use scene::{
     Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Mesh, MorphTarget, Node,

@@ -470,7 +470,8 @@ impl TileShader<'_> {
 
     /// As [`Self::rays`], of diffuse light.
     fn diffused_rays(&self, surface: &Surface, sharp: f32) -> u32 {
-        self.rays(sharp, false, surface.base_color.max_element())
+        let share = surface.base_color.max(surface.finish.sheen.reflectance);
+        self.rays(sharp, false, share.max_element())
     }
 
     /// How many directions to the environment a surface draws.
