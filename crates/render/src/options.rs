@@ -118,6 +118,7 @@ pub enum CasterPolicy {
 
 /// What finds the hard shadows of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ShadowStructure {
     /// What is predicted to cost the least ([`rayward_trace::ShadowCosts`]); HM08's grid with its parameters.
     #[default]

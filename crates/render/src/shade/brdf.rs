@@ -9,7 +9,7 @@
 //! S = D V: Trowbridge-Reitz (GGX) distribution and height-correlated Smith visibility, alpha = roughness^2
 //! ```
 //!
-//! Films, sheen and anisotropy come in where a surface has them ([`super::finish`]).
+//! Films, sheen and anisotropy come in where a surface has them ([`super::SurfaceFinish`]).
 //!
 //! Limits: single scattering, so a metal of roughness 1 seen head on reflects 31 % only; the specification's mix
 //! lets smooth white dielectrics gain light at grazing views (a third at 86 degrees); alpha is at least

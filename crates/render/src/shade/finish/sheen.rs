@@ -11,7 +11,7 @@
 //! use in some 50 ms. As `passed` depends on the viewer alone, sheen lies over a surface as a coat does.
 //!
 //! Limits: the shadowing term for the light's direction is left out of `passed`, as the extension allows; roughness is at
-//! least 0.07; emission and transmitted light pass without loss of light to the fibres but for `passed`.
+//! least 0.07; what the surface emits passes the fibres without loss.
 
 use std::f32::consts::{FRAC_1_PI, PI};
 use std::sync::OnceLock;
