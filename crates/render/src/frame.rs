@@ -36,6 +36,7 @@ pub struct Renderer<'s> {
 
 /// A rendered frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RenderedFrame {
     /// The picture and its layers.
     pub film: Film,
@@ -45,6 +46,7 @@ pub struct RenderedFrame {
 
 /// How far a frame has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Tiles done.
     pub done: u64,

@@ -330,7 +330,7 @@ impl TileShader<'_> {
                 u: bary.x,
                 v: bary.y,
                 view: (-ray.dir.normalize()).as_vec3(),
-                footprint: self.camera.footprint(depth),
+                footprint: self.cone(depth).width,
             },
         );
         Shaded {

@@ -13,6 +13,7 @@
 
 pub mod brdf;
 mod coat;
+mod finish;
 mod light;
 pub mod lobes;
 mod surface;
@@ -21,6 +22,7 @@ use glam::Vec3;
 use rayward_trace::{AreaLight, Light};
 
 pub use coat::Coat;
+pub use finish::{Anisotropy, Iridescence, Sheen, SurfaceFinish};
 pub use light::{Incident, ShadingLight};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
 
@@ -154,6 +156,9 @@ pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
             + share(traced.diffusion, back)
     };
     let coat = Vec3::splat(share(traced.coat, surface.coat.reflectance));
-    let around = surrounding * surface.base_color * (surface.occlusion * left);
+    let sheen = &surface.finish.sheen;
+    let fibres = sheen.reflectance * share(traced.diffusion, surface.occlusion);
+    let below = surface.occlusion * (left * sheen.passed);
+    let around = surrounding * surface.base_color * below + surrounding * fibres;
     (surface.emissive + around) * surface.coat.passed + surrounding * coat * surface.occlusion
 }
