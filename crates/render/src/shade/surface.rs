@@ -6,7 +6,7 @@
 //! texture coordinates as in `MikkTSpace`, not smoothed over vertices.
 //!
 //! Textures are filtered by the footprint of the pixel on the surface (Akenine-Möller et al., "Texture Level of
-//! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce).
+//! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce). Masks are not filtered.
 
 use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -435,6 +435,13 @@ impl<'s> Shader<'s> {
             pixel * pixel / plane.length() as f32,
         );
         let base = base_color(geometry, &corners, material, &lookup);
+        let alpha = if let AlphaMode::Mask { .. } = material.alpha_mode {
+            // The mean of a mask is no mask: leaves would vanish at a distance, and not be those that cast shadows.
+            let sharp = self.lookup(geometry, &corners, material, 0.0);
+            base_color(geometry, &corners, material, &sharp).w
+        } else {
+            base.w
+        };
         let arm = lookup
             .get(&material.metallic_roughness_texture)
             .unwrap_or(Vec4::ONE);
@@ -481,7 +488,7 @@ impl<'s> Shader<'s> {
             normal: shading,
             view: point.view,
             base_color: base.xyz(),
-            alpha: material.coverage(base.w),
+            alpha: material.coverage(alpha),
             metallic: (material.metallic * arm.z).clamp(0.0, 1.0),
             roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
             f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
