@@ -186,7 +186,7 @@ fn edges_of_hard_shadows_are_those_of_all_samples_where_something_is_transparent
     };
     scene.materials.truncate(1);
     scene.materials.push(rayward::scene::Material {
-        base_color: glam::Vec4::new(0.2, 0.4, 0.9, 0.5),
+        base_color: Vec4::new(0.2, 0.4, 0.9, 0.5),
         alpha_mode: rayward::scene::AlphaMode::Blend,
         double_sided: true,
         ..rayward::scene::Material::default()

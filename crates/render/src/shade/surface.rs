@@ -435,13 +435,6 @@ impl<'s> Shader<'s> {
             pixel * pixel / plane.length() as f32,
         );
         let base = base_color(geometry, &corners, material, &lookup);
-        let alpha = if let AlphaMode::Mask { .. } = material.alpha_mode {
-            // The mean of a mask is no mask: leaves would vanish at a distance, and not be those that cast shadows.
-            let sharp = self.lookup(geometry, &corners, material, 0.0);
-            base_color(geometry, &corners, material, &sharp).w
-        } else {
-            base.w
-        };
         let arm = lookup
             .get(&material.metallic_roughness_texture)
             .unwrap_or(Vec4::ONE);
@@ -488,7 +481,7 @@ impl<'s> Shader<'s> {
             normal: shading,
             view: point.view,
             base_color: base.xyz(),
-            alpha: material.coverage(alpha),
+            alpha: self.coverage(geometry, &corners, material, base.w),
             metallic: (material.metallic * arm.z).clamp(0.0, 1.0),
             roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
             f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
@@ -542,6 +535,23 @@ impl<'s> Shader<'s> {
             finish: finish.unwrap_or(SurfaceFinish::NONE),
             coat: Coat::new(material.coat.factor, material.coat.roughness, [normal; 2], view),
         }
+    }
+
+    /// Coverage at a point where the filtered alpha is this.
+    #[inline]
+    fn coverage(
+        &self,
+        geometry: &FrameGeometry,
+        corners: &Corners,
+        material: &ShaderMaterial,
+        filtered: f32,
+    ) -> f32 {
+        let AlphaMode::Mask { .. } = material.alpha_mode else {
+            return material.coverage(filtered);
+        };
+        // The mean of a mask is no mask: leaves would vanish at a distance, and not be those that cast shadows.
+        let sharp = self.lookup(geometry, corners, material, 0.0);
+        material.coverage(base_color(geometry, corners, material, &sharp).w)
     }
 
     fn material(&self, geometry: &FrameGeometry, object: u32) -> &ShaderMaterial {
