@@ -427,6 +427,32 @@ impl TileShader<'_> {
                 asked.push((i as u32, incident.radiance));
             }
         }
+        self.hidden(light, receivers, scratch, shadow);
+        // From here on those that nothing opaque hides.
+        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
+        receivers.retain(|_| kept.next() == Some(true));
+        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
+        asked.retain(|_| kept.next() == Some(true));
+        if let (Some(every), Some(plan)) = (&self.reference, &self.ends[light]) {
+            let share = |receiver| self.transmittance(every, receiver, &plan.light, filters);
+            passed.clear();
+            passed.extend(receivers.iter().map(share));
+        } else {
+            self.pass(light, receivers, veil_scratch, passed);
+        }
+        for (&(i, radiance), &passed) in asked.iter().zip(&*passed) {
+            points[i as usize].color += radiance * passed;
+        }
+    }
+
+    /// Which receivers an opaque triangle hides from a light without a size.
+    fn hidden(
+        &self,
+        light: usize,
+        receivers: &[Receiver],
+        scratch: &mut ShadowScratch,
+        shadow: &mut Vec<bool>,
+    ) {
         match &self.structures.lights[light] {
             LightShadows::Grid(grid) => grid.shadowed(receivers, scratch, shadow),
             LightShadows::Tree(tree, passed) => {
@@ -443,21 +469,6 @@ impl TileShader<'_> {
                 shadow.clear();
                 shadow.resize(receivers.len(), false);
             }
-        }
-        // From here on those that nothing opaque hides.
-        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
-        receivers.retain(|_| kept.next() == Some(true));
-        let mut kept = shadow.iter().map(|in_shadow| !in_shadow);
-        asked.retain(|_| kept.next() == Some(true));
-        if let (Some(every), Some(plan)) = (&self.reference, &self.ends[light]) {
-            let share = |receiver| self.transmittance(every, receiver, &plan.light, filters);
-            passed.clear();
-            passed.extend(receivers.iter().map(share));
-        } else {
-            self.pass(light, receivers, veil_scratch, passed);
-        }
-        for (&(i, radiance), &passed) in asked.iter().zip(&*passed) {
-            points[i as usize].color += radiance * passed;
         }
     }
 

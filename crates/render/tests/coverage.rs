@@ -172,6 +172,41 @@ fn edges_of_hard_shadows_are_those_of_all_samples() {
 }
 
 #[test]
+fn edges_of_hard_shadows_are_those_of_all_samples_where_something_is_transparent() {
+    let (mut scene, plain) = blocks();
+    let pane = |height: f32| {
+        let corner = Vec3::new(-0.5, height, 0.7);
+        let (u, v) = (Vec3::new(1.4, 0.0, 0.3), Vec3::new(-0.2, 0.0, -1.3));
+        rayward::scene::Primitive {
+            positions: vec![corner, corner + u, corner + u + v, corner + v],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            material: 1,
+            ..rayward::scene::Primitive::default()
+        }
+    };
+    scene.materials.truncate(1);
+    scene.materials.push(rayward::scene::Material {
+        base_color: Vec4::new(0.2, 0.4, 0.9, 0.5),
+        alpha_mode: rayward::scene::AlphaMode::Blend,
+        double_sided: true,
+        ..rayward::scene::Material::default()
+    });
+    scene.meshes[0].primitives.push(pane(1.6));
+    let mut frame = scene.at(0.0);
+    (frame.cameras, frame.lights) = (plain.cameras, plain.lights);
+    for tinted_shadows in [false, true] {
+        let options = RenderOptions {
+            tinted_shadows,
+            ..options(Antialias::Samples)
+        };
+        let [all, cover] = both(&scene, &frame, &options);
+        assert!(apart(&all.film, &cover.film) < 1e-5, "{tinted_shadows}");
+        let [many, few] = [&all, &cover].map(|frame| frame.stats.surfaces);
+        assert!(few * 3 < many, "{few} surfaces instead of {many}");
+    }
+}
+
+#[test]
 fn layers_are_those_of_the_centres() {
     let (scene, frame) = blocks();
     let [all, cover] = both(&scene, &frame, &options(Antialias::Samples));

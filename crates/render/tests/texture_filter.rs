@@ -2,10 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use rayward::scene::{
-    FrameGeometry, Image, Material, Mesh, Node, PosedCamera, Primitive, Projection, Sampler, Scene,
-    TextureRef, TextureTransform,
+    AlphaMode, FrameGeometry, Image, Material, Mesh, Node, PosedCamera, Primitive, Projection, Sampler,
+    Scene, TextureRef, TextureTransform,
 };
-use rayward::{Antialias, Lens, PixelFilter, RenderOptions, Renderer};
+use rayward::{Antialias, Layers, Lens, PixelFilter, RenderOptions, Renderer};
 
 const SIZE: u32 = 64;
 
@@ -74,6 +74,34 @@ fn stripes() -> (Scene, FrameGeometry, PosedCamera) {
     };
     let frame = scene.at(0.0);
     (scene, frame, camera)
+}
+
+#[test]
+fn masks_cover_as_much_at_a_distance() {
+    let (mut scene, frame, mut camera) = stripes();
+    for (i, texel) in scene.images[0].texels.iter_mut().enumerate() {
+        texel[3] = if i % 4 == 0 { 255 } else { 0 };
+    }
+    scene.materials[0].alpha_mode = AlphaMode::Mask { cutoff: 0.5 };
+    // 17.4 texels a pixel.
+    camera.projection = Projection::Orthographic {
+        half_height: 4.37,
+        aspect: None,
+    };
+    let options = RenderOptions {
+        width: SIZE,
+        height: SIZE,
+        layers: Layers {
+            alpha: true,
+            ..Layers::default()
+        },
+        ..RenderOptions::default()
+    };
+    let mut renderer = Renderer::new(&scene);
+    let rendered = renderer.render(&frame, &camera, &[], &options, &|_| ());
+    let alpha = rendered.expect("valid input").film.alpha;
+    let covered = alpha.iter().sum::<f32>() / (SIZE * SIZE) as f32 * 4.37 * 4.37;
+    assert!((covered - 0.25).abs() < 0.1, "{covered}");
 }
 
 /// Two pixels in the middle of the picture.

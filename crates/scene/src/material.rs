@@ -257,8 +257,8 @@ impl std::fmt::Debug for Image {
     }
 }
 
-/// Filtering and wrapping of a texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Filtering and wrapping of a texture; by default it repeats and is filtered as well as can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sampler {
     /// Wrapping in u.
     pub wrap_u: Wrap,
@@ -268,8 +268,20 @@ pub struct Sampler {
     pub mag_nearest: bool,
     /// Nearest texel when minified instead of linear.
     pub min_nearest: bool,
-    /// Whether the file asks for mipmaps.
+    /// Whether there are mipmaps: if the file asks for them, or does not say how to minify.
     pub mipmaps: bool,
+}
+
+impl Default for Sampler {
+    fn default() -> Self {
+        Self {
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            mag_nearest: false,
+            min_nearest: false,
+            mipmaps: true,
+        }
+    }
 }
 
 /// What happens outside of \[0, 1\].

@@ -376,6 +376,12 @@ fn materials_with_their_extensions_and_textures() {
         (sampler.mag_nearest, sampler.min_nearest, sampler.mipmaps),
         (true, false, true)
     );
+    // Who does not say how to minify leaves it to us, who says "linear" does not.
+    for (filter, mipmaps) in [(json!({}), true), (json!({"minFilter": 9729}), false)] {
+        file.json["samplers"] = json!([filter]);
+        assert_eq!(file.load().expect("a sound file").samplers[1].mipmaps, mipmaps);
+    }
+    assert!(scene.samplers[0].mipmaps);
 }
 
 #[test]

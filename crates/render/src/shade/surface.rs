@@ -6,7 +6,7 @@
 //! texture coordinates as in `MikkTSpace`, not smoothed over vertices.
 //!
 //! Textures are filtered by the footprint of the pixel on the surface (Akenine-Möller et al., "Texture Level of
-//! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce).
+//! Detail Strategies for Real-Time Ray Tracing", 2019: ray cones of one bounce). Masks are not filtered.
 
 use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
@@ -481,7 +481,7 @@ impl<'s> Shader<'s> {
             normal: shading,
             view: point.view,
             base_color: base.xyz(),
-            alpha: material.coverage(base.w),
+            alpha: self.coverage(geometry, &corners, material, base.w),
             metallic: (material.metallic * arm.z).clamp(0.0, 1.0),
             roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
             f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
@@ -535,6 +535,23 @@ impl<'s> Shader<'s> {
             finish: finish.unwrap_or(SurfaceFinish::NONE),
             coat: Coat::new(material.coat.factor, material.coat.roughness, [normal; 2], view),
         }
+    }
+
+    /// Coverage at a point where the filtered alpha is this.
+    #[inline]
+    fn coverage(
+        &self,
+        geometry: &FrameGeometry,
+        corners: &Corners,
+        material: &ShaderMaterial,
+        filtered: f32,
+    ) -> f32 {
+        let AlphaMode::Mask { .. } = material.alpha_mode else {
+            return material.coverage(filtered);
+        };
+        // The mean of a mask is no mask: leaves would vanish at a distance, and not be those that cast shadows.
+        let sharp = self.lookup(geometry, corners, material, 0.0);
+        material.coverage(base_color(geometry, corners, material, &sharp).w)
     }
 
     fn material(&self, geometry: &FrameGeometry, object: u32) -> &ShaderMaterial {

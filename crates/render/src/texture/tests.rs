@@ -244,6 +244,7 @@ fn samplers_without_mipmaps_stay_at_the_image() {
         ramp(),
         Sampler {
             mag_nearest: true,
+            mipmaps: false,
             ..Sampler::default()
         },
     );

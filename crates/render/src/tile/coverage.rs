@@ -6,13 +6,14 @@
 //! same light are a *share* of it; the first of them is shaded, and stands for as many as follow.
 //!
 //! What a sample sees comes from the eye's grid of its shifted raster, and which hard lights reach it from the lights'
-//! receiver grids: a bit a sample and light. So edges of things and of hard shadows are as smooth as with all samples
+//! receiver grids: a bit a sample and light. Where something is transparent there are none, and each sample is looked up in
+//! the lights' grids of casters and of veils; samples that get the same eighths of the light are shaded as one. So edges of things and of hard shadows are as smooth as with all samples
 //! shaded, at the cost of their visibility alone.
 //!
 //! What cannot be told without shading is shaded for each sample: whatever is seen through veils, solids, an environment
 //! behind everything, and materials that are mirrors or glass, for what these show has edges of its own. Limits: lights with
 //! a size, drawn reflections, and an environment as light are seen by the first samples of shares alone, hence with their
-//! noise; so are hard lights where something is transparent, hence with jagged shadows.
+//! noise.
 //!
 //! Layout: 40 bytes a share, first one for each pixel of the tile in rows, then those that follow, linked. Cost of a
 //! sample that joins a share: about 10 ns on the same triangle, 100 ns on another.
@@ -204,7 +205,7 @@ impl TileShader<'_> {
         shares: &mut TileShares,
         tile: &Tile,
         [x, y]: [u32; 2],
-        work: &TileWork,
+        work: &mut TileWork,
     ) -> bool {
         let [column, row] = [tile.x + x, tile.y + y];
         let view = self.structures.eye.view();
@@ -228,7 +229,7 @@ impl TileShader<'_> {
         tile: &Tile,
         [x, y]: [u32; 2],
         ray: &ViewRay,
-        work: &TileWork,
+        work: &mut TileWork,
     ) -> Option<Glance> {
         let through_veils = self.structures.veils.is_some() && !work.veils.pixel(x, y).is_empty();
         if through_veils || self.solid_at([x, y], ray, work).is_some() {
@@ -246,30 +247,66 @@ impl TileShader<'_> {
         if sharing.sharp[object as usize] {
             return None;
         }
-        let lights = self.lights_at(tile, [x, y], ray, prim);
+        let lights = self.lights_at(tile, [x, y], (ray, prim), work);
         Some(Glance { prim, lights })
     }
 
-    /// Which of the hard lights that were asked for all pixels at once reach a surface, hashed.
-    fn lights_at(&self, tile: &Tile, [x, y]: [u32; 2], ray: &ViewRay, prim: u32) -> u32 {
-        let beside_solids = |light: usize| {
+    /// How much of each light without a size reaches a surface, hashed.
+    fn lights_at(
+        &self,
+        tile: &Tile,
+        [x, y]: [u32; 2],
+        (ray, prim): (&ViewRay, u32),
+        work: &mut TileWork,
+    ) -> u32 {
+        let receiver = || {
             let corners = triangles(self.geometry).corners(prim);
-            let end = self.ends[light].as_ref().map(|plan| plan.light);
             let hit = exact::attributes(ray.origin, ray.dir, corners);
-            let receiver = hit.map(|hit| Receiver::along(ray, hit.t, prim));
-            let hidden = receiver
+            hit.map(|hit| Receiver::along(ray, hit.t, prim))
+        };
+        let beside_solids = |light: usize| {
+            let end = self.ends[light].as_ref().map(|plan| plan.light);
+            let hidden = receiver()
                 .zip(end)
                 .is_some_and(|(receiver, end)| self.solid_hides(light, &receiver, &end));
             !hidden
         };
         let mut hash = 0u32;
         for (light, shadows) in self.structures.lights.iter().enumerate() {
-            if let LightShadows::Pixels(lit) = shadows {
-                let lit = lit.is_lit(tile.index, x, y) && (self.solids.is_none() || beside_solids(light));
-                hash = hash.wrapping_mul(0x9e37_79b1).wrapping_add(1 + u32::from(lit));
-            }
+            let reaching = match shadows {
+                LightShadows::Pixels(lit) => u32::from(lit.is_lit(tile.index, x, y)),
+                LightShadows::Grid(_) | LightShadows::Tree(..) => {
+                    receiver().map_or(0, |receiver| self.eighths(light, receiver, work))
+                }
+                _ => continue,
+            };
+            let reached = reaching > 0 && (self.solids.is_none() || beside_solids(light));
+            let reaching = if reached { reaching } else { 0 };
+            hash = hash.wrapping_mul(0x9e37_79b1).wrapping_add(1 + reaching);
         }
         hash
+    }
+
+    /// How many eighths of a light's red, green and blue reach a receiver, as digits.
+    fn eighths(&self, light: usize, receiver: Receiver, work: &mut TileWork) -> u32 {
+        if !self.faces(light, &receiver) {
+            return 0;
+        }
+        let TileWork {
+            scratch,
+            shadow,
+            veil_scratch,
+            passed,
+            ..
+        } = work;
+        let receivers = [receiver];
+        self.hidden(light, &receivers, scratch, shadow);
+        if shadow[0] {
+            return 0;
+        }
+        self.pass(light, &receivers, veil_scratch, passed);
+        let digits = passed[0].to_array().map(|share| (share * 8.0).round() as u32);
+        digits.into_iter().fold(0, |all, digit| all * 9 + digit)
     }
 
     /// Whether two triangles that rays of one pixel meet are shaded as one: parts of one object, hardly turned against each

@@ -354,7 +354,7 @@ fn read_samplers(source: &Source<'_>) -> Result<Vec<Sampler>, Error> {
                 min,
                 Some(MinFilter::Nearest | MinFilter::NearestMipmapNearest | MinFilter::NearestMipmapLinear)
             ),
-            mipmaps: min.is_some_and(|filter| !matches!(filter, MinFilter::Nearest | MinFilter::Linear)),
+            mipmaps: min.is_none_or(|filter| !matches!(filter, MinFilter::Nearest | MinFilter::Linear)),
         });
     }
     Ok(samplers)
