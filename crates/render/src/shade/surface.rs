@@ -10,12 +10,12 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
-use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
+use rayward_scene::{AlphaMode, FrameGeometry, Scene};
 use rayward_trace::solids::Crossing;
 
 use super::coat::Coat;
-use crate::casters::is_thin_glass;
-use crate::texture::{Encoding, Texture, Textures};
+use super::material::{ShaderCoat, ShaderMaterial, references};
+use crate::texture::{Texture, Textures};
 
 /// A point on a surface of the frame, as seen from somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,144 +115,6 @@ pub struct Shader<'s> {
     textures: Textures<'s>,
 }
 
-/// A material with its textures resolved.
-#[derive(Clone, Debug)]
-struct ShaderMaterial {
-    base_color: Vec4,
-    metallic: f32,
-    roughness: f32,
-    emissive: Vec3,
-    /// Reflectance at normal incidence by the index of refraction alone.
-    ior_reflectance: f32,
-    specular: f32,
-    specular_color: Vec3,
-    transmission: f32,
-    ior: f32,
-    thin: bool,
-    thin_glass: bool,
-    absorption: Vec3,
-    normal_scale: f32,
-    occlusion_strength: f32,
-    alpha_mode: AlphaMode,
-    unlit: bool,
-    textured: bool,
-    base_color_texture: Option<Texture>,
-    metallic_roughness_texture: Option<Texture>,
-    normal_texture: Option<Texture>,
-    occlusion_texture: Option<Texture>,
-    emissive_texture: Option<Texture>,
-    specular_texture: Option<Texture>,
-    specular_color_texture: Option<Texture>,
-    transmission_texture: Option<Texture>,
-    coat: ShaderCoat,
-}
-
-/// A coat with its textures resolved.
-#[derive(Clone, Debug)]
-struct ShaderCoat {
-    factor: f32,
-    roughness: f32,
-    normal_scale: f32,
-    texture: Option<Texture>,
-    roughness_texture: Option<Texture>,
-    normal_texture: Option<Texture>,
-}
-
-/// The texture references of a material that shading uses, with their encodings.
-fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 11] {
-    [
-        (material.base_color_texture, Encoding::Srgb),
-        (material.metallic_roughness_texture, Encoding::Linear),
-        (material.normal_texture, Encoding::Linear),
-        (material.occlusion_texture, Encoding::Linear),
-        (material.emissive_texture, Encoding::Srgb),
-        (material.specular_texture, Encoding::Linear),
-        (material.specular_color_texture, Encoding::Srgb),
-        (material.transmission_texture, Encoding::Linear),
-        (material.coat.texture, Encoding::Linear),
-        (material.coat.roughness_texture, Encoding::Linear),
-        (material.coat.normal_texture, Encoding::Linear),
-    ]
-}
-
-/// Absorption per metre that leaves `attenuation_color` of white light after `attenuation_distance`
-/// (`KHR_materials_volume`).
-fn absorption(material: &Material) -> Vec3 {
-    // A colour of exactly 0 would need infinite absorption; this leaves less than a millionth.
-    let left = material.attenuation_color.clamp(Vec3::splat(1e-6), Vec3::ONE);
-    if material.thickness > 0.0 && material.attenuation_distance > 0.0 {
-        -Vec3::new(left.x.ln(), left.y.ln(), left.z.ln()) / material.attenuation_distance
-    } else {
-        Vec3::ZERO
-    }
-}
-
-impl ShaderMaterial {
-    fn new(material: &Material, scene: &Scene, textures: &Textures) -> Self {
-        let resolved = references(material)
-            .map(|(reference, encoding)| reference.and_then(|r| textures.resolve(scene, &r, encoding)));
-        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
-        Self {
-            base_color: material.base_color,
-            metallic: material.metallic,
-            roughness: material.roughness,
-            emissive: material.emissive,
-            ior_reflectance: ratio * ratio,
-            specular: material.specular,
-            specular_color: material.specular_color,
-            transmission: material.transmission,
-            ior: material.ior,
-            thin: material.thickness <= 0.0,
-            thin_glass: is_thin_glass(material),
-            absorption: absorption(material),
-            normal_scale: material.normal_scale,
-            occlusion_strength: material.occlusion_strength,
-            alpha_mode: material.alpha_mode,
-            unlit: material.unlit,
-            textured: resolved.iter().any(Option::is_some),
-            base_color_texture: resolved[0],
-            metallic_roughness_texture: resolved[1],
-            normal_texture: resolved[2],
-            occlusion_texture: resolved[3],
-            emissive_texture: resolved[4],
-            specular_texture: resolved[5],
-            specular_color_texture: resolved[6],
-            transmission_texture: resolved[7],
-            coat: ShaderCoat {
-                factor: material.coat.factor,
-                roughness: material.coat.roughness,
-                normal_scale: material.coat.normal_scale,
-                texture: resolved[8],
-                roughness_texture: resolved[9],
-                normal_texture: resolved[10],
-            },
-        }
-    }
-
-    fn is_opaque(&self) -> bool {
-        self.alpha_mode == AlphaMode::Opaque && !self.thin_glass
-    }
-
-    /// Share of light that goes straight through what is covered, but for its colour.
-    fn passed(&self, lookup: &Lookup) -> f32 {
-        if !self.thin_glass {
-            return 0.0;
-        }
-        let texel = |texture| lookup.get(texture).unwrap_or(Vec4::ONE);
-        let metallic = (self.metallic * texel(&self.metallic_roughness_texture).z).clamp(0.0, 1.0);
-        let through = self.transmission * texel(&self.transmission_texture).x;
-        through * (1.0 - metallic) * (1.0 - self.ior_reflectance * self.specular).max(0.0)
-    }
-
-    fn coverage(&self, alpha: f32) -> f32 {
-        match self.alpha_mode {
-            AlphaMode::Opaque => 1.0,
-            AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
-            AlphaMode::Blend => alpha.clamp(0.0, 1.0),
-        }
-    }
-}
-
 /// Corners of a triangle and their weights at a point.
 #[derive(Clone, Copy)]
 struct Corners {
@@ -310,7 +172,7 @@ impl Coordinates {
 }
 
 /// Texture lookups at one point.
-struct Lookup<'a> {
+pub(super) struct Lookup<'a> {
     textures: &'a Textures<'a>,
     sets: [Coordinates; 2],
 }
@@ -323,7 +185,7 @@ impl Lookup<'_> {
 
     /// The texel, or `None` without a texture.
     #[inline]
-    fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
+    pub(super) fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
         let texture = texture.as_ref()?;
         let set = self.set(texture);
         Some(self.textures.sample(texture, set.at, texture.level_of(set.area)))
@@ -346,6 +208,16 @@ impl<'s> Shader<'s> {
             .map(|m| ShaderMaterial::new(m, scene, &textures))
             .collect();
         Self { materials, textures }
+    }
+
+    /// The materials of the scene, in its order.
+    pub fn materials(&self) -> &[ShaderMaterial] {
+        &self.materials
+    }
+
+    /// The images that these use.
+    pub fn textures(&self) -> &Textures<'s> {
+        &self.textures
     }
 
     /// Share of light that a surface lets through at a point: what the alpha of [`Self::surface`] leaves, for a
