@@ -360,13 +360,7 @@ impl TileShader<'_> {
     }
 
     /// A surface where a ray meets a triangle, with this light.
-    fn shaded(
-        &self,
-        object: u32,
-        (prim, hit): (u32, &ExactHit),
-        surface: Surface,
-        color: Vec3,
-    ) -> Shaded {
+    fn shaded(&self, object: u32, (prim, hit): (u32, &ExactHit), surface: Surface, color: Vec3) -> Shaded {
         Shaded {
             prim,
             object,

@@ -62,7 +62,9 @@ impl TileShader<'_> {
             return Vec::new().into_iter();
         };
         let met = flights.iter().zip(hits);
-        let at = |(flight, hit): (&Flight, &SurfaceHit)| Some(self.met_at(flight, hit.as_ref()?.0, &hit.as_ref()?.1));
+        let at = |(flight, hit): (&Flight, &SurfaceHit)| {
+            Some(self.met_at(flight, hit.as_ref()?.0, &hit.as_ref()?.1))
+        };
         let points: Vec<_> = met.filter_map(at).collect();
         self.surfaces(shading, &points).into_iter()
     }

@@ -210,9 +210,17 @@ impl TileShader<'_> {
         let traced = self.traced(surface, bounces);
         let coat = surface.coated().filter(|_| traced.coat);
         [
-            if traced.reflection { self.reflected_rays(surface, sharp) } else { 0 },
+            if traced.reflection {
+                self.reflected_rays(surface, sharp)
+            } else {
+                0
+            },
             coat.map_or(0, |coat| self.reflected_rays(&coat, sharp)),
-            if traced.diffusion { self.diffused_rays(surface, sharp) } else { 0 },
+            if traced.diffusion {
+                self.diffused_rays(surface, sharp)
+            } else {
+                0
+            },
         ]
     }
 

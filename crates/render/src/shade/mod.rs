@@ -70,7 +70,12 @@ pub(crate) fn direct_beside(
 
 /// What a surface reflects of a sample of a light, of which it has so many per steradian, where so many rays of its own
 /// reflection and its coat's meet the light, too.
-fn reflected_beside(surface: &Surface, incident: Incident, density: f32, drawn: [u32; 2]) -> Option<Incident> {
+fn reflected_beside(
+    surface: &Surface,
+    incident: Incident,
+    density: f32,
+    drawn: [u32; 2],
+) -> Option<Incident> {
     if drawn == [0; 2] {
         return reflected(surface, incident, &[1.0; 2]);
     }
@@ -99,7 +104,12 @@ pub(crate) fn reaches(surface: &Surface, light: &ShadingLight) -> bool {
 }
 
 /// The same of [`direct_from`].
-pub(crate) fn reaches_from(surface: &Surface, light: &ShadingLight, area: &AreaLight, sample: &Light) -> bool {
+pub(crate) fn reaches_from(
+    surface: &Surface,
+    light: &ShadingLight,
+    area: &AreaLight,
+    sample: &Light,
+) -> bool {
     let incident = || light.incident_from(area, sample, surface.position);
     !surface.unlit && incident().is_some_and(|incident| faces(surface, incident.towards))
 }
@@ -107,7 +117,11 @@ pub(crate) fn reaches_from(surface: &Surface, light: &ShadingLight, area: &AreaL
 /// Whether light from a direction arrives on the viewer's side of the surface, or of its coat.
 #[inline]
 fn faces(surface: &Surface, towards: Vec3) -> bool {
-    let coated = || surface.coated().is_some_and(|coat| coat.normal.dot(towards) > 0.0);
+    let coated = || {
+        surface
+            .coated()
+            .is_some_and(|coat| coat.normal.dot(towards) > 0.0)
+    };
     (surface.normal.dot(towards) > 0.0 || coated()) && surface.geometric_normal.dot(towards) > 0.0
 }
 

@@ -8,11 +8,11 @@ use glam::{DVec3, Vec3};
 use rayward_trace::{AreaLight, Light, Receiver, Samples, Tile, exact};
 
 use super::{TileShader, TileWork};
-use crate::{RenderOptions, Surface};
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
 use crate::shade::{Beam, LightRays, Source, direct, direct_beside, reaches_from};
 use crate::structures::LightShadows;
+use crate::{RenderOptions, Surface};
 
 /// The samples of a light: each light, and each sample of the pixels, has sets of its own.
 pub(crate) fn samples(options: &RenderOptions, light: usize, sample: u32) -> Samples {

@@ -42,12 +42,7 @@ impl TileShader<'_> {
     }
 
     /// What surfaces send of the light of their beams.
-    pub(crate) fn lit(
-        &self,
-        shading: &dyn SurfaceShader,
-        surfaces: &[Surface],
-        beams: &[Beam],
-    ) -> Vec<Vec3> {
+    pub(crate) fn lit(&self, shading: &dyn SurfaceShader, surfaces: &[Surface], beams: &[Beam]) -> Vec<Vec3> {
         let lit = shading.lit(surfaces, beams);
         lit.unwrap_or_else(|| self.on_cpu().lit(surfaces, beams))
     }
@@ -108,14 +103,7 @@ impl TileShader<'_> {
     }
 
     /// Finds what the ray of a pixel meets up to the first opaque triangle or solid.
-    fn meet(
-        &self,
-        tile: &Tile,
-        [x, y]: [u32; 2],
-        ray: &ViewRay,
-        work: &TileWork,
-        together: &mut Together,
-    ) {
+    fn meet(&self, tile: &Tile, [x, y]: [u32; 2], ray: &ViewRay, work: &TileWork, together: &mut Together) {
         let solid = self.solid_at([x, y], ray, work);
         let end = solid.map_or(f64::INFINITY, |(_, crossing)| crossing.t);
         if self.structures.veils.is_some() {
