@@ -99,7 +99,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         &rendered.stats,
         &times,
         files,
-    );
+    )
+    .with_device(&device);
     if args.run.json {
         report::to_stdout_json(&summary)
     } else {

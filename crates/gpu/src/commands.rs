@@ -83,7 +83,8 @@ impl Gpu {
                 adapter: self.name(),
                 what,
                 needed: 4 * count,
-                limit: 4 * u64::from(u32::MAX).min(width * width * u64::from(limits.max_texture_array_layers)),
+                limit: 4 * u64::from(u32::MAX)
+                    .min(width * width * u64::from(limits.max_texture_array_layers)),
             });
         }
         let height = rows.div_ceil(layers);

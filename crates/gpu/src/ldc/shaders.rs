@@ -135,9 +135,7 @@ mod tests {
     use crate::bvh::Node;
     use crate::grid::{Grid, Place, Plate};
     use crate::ldc::layout::{Found, Frame, Query, Raise, Scan, TexelRay};
-    use crate::shade::layout::{
-        BeamRow, Lamp, Level, Lit, Material, Point, Row, Shading, Triangle, Use,
-    };
+    use crate::shade::layout::{BeamRow, Lamp, Level, Lit, Material, Point, Row, Shading, Triangle, Use};
     use crate::skin::{Influence, Skin};
 
     fn parsed(program: &Program) -> (naga::Module, ModuleInfo) {

@@ -10,7 +10,7 @@
 //! one after the other in a single array texture, which has no limit of 128 MiB, and are read one by one and filtered by
 //! arithmetic.
 //!
-//! Layout: 4 bytes a texel; a frame takes 32 bytes a triangle and 12 to 76 a vertex. A surface is 160 bytes each way, a beam
+//! Layout: 4 bytes a texel; a frame takes 32 bytes a triangle and 12 to 72 a vertex. A surface is 160 bytes each way, a beam
 //! 64. Cost: two submissions a tile, and two more for each wave of rays from it. Limits: attributes of all vertices in one
 //! binding, 1.8 million vertices if they have all of them; 2^32 texels. Texture coordinates that are not finite show any texel.
 //! On the CPU remain: surfaces of solids, directions and radiance of an environment, lights as mirrors show them, and frames
@@ -28,9 +28,7 @@ use glam::Vec3;
 use rayward::scene::FrameGeometry;
 use rayward::texture::Texture;
 use rayward::tonemap::decode_srgb8;
-use rayward::{
-    Beam, Shader, ShadingBuilder, ShadingLight, Surface, SurfacePoint, SurfaceShader,
-};
+use rayward::{Beam, Shader, ShadingBuilder, ShadingLight, Surface, SurfacePoint, SurfaceShader};
 use wgpu::{BindingResource, Buffer};
 
 use crate::ldc::build::groups;
@@ -288,7 +286,9 @@ impl SurfaceShader for FrameShading<'_> {
             return None;
         }
         let made: Result<Vec<_>> = points.chunks(BATCH).map(|part| self.surfaces_of(part)).collect();
-        let made = self.of.noted(made, |stats| stats.surfaces += points.len() as u64)?;
+        let made = self
+            .of
+            .noted(made, |stats| stats.surfaces += points.len() as u64)?;
         Some(made.concat())
     }
 

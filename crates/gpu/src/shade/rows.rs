@@ -130,7 +130,10 @@ pub(super) fn vertices(geometry: &FrameGeometry) -> (Vec<f32>, [u32; 5]) {
     append(&mut starts[1], &flat4(&attributes.tangents));
     append(&mut starts[2], &flat4(&attributes.colors));
     for (start, uvs) in starts[3..].iter_mut().zip([&attributes.uvs, &attributes.uvs1]) {
-        append(start, &uvs.iter().flat_map(|uv| uv.to_array()).collect::<Vec<_>>());
+        append(
+            start,
+            &uvs.iter().flat_map(|uv| uv.to_array()).collect::<Vec<_>>(),
+        );
     }
     (all, starts)
 }
@@ -236,7 +239,11 @@ pub(super) fn beam(beam: &Beam) -> BeamRow {
             radiance: radiance.to_array(),
             ..row
         },
-        Source::Light(which) => BeamRow { kind: 1, which, ..row },
+        Source::Light(which) => BeamRow {
+            kind: 1,
+            which,
+            ..row
+        },
         Source::Sample {
             light: which,
             end,
@@ -276,8 +283,16 @@ pub(super) fn beam(beam: &Beam) -> BeamRow {
 }
 
 fn lobes(traced: Traced) -> u32 {
-    let bits = [traced.reflection, traced.transmission, traced.diffusion, traced.coat];
-    bits.iter().zip(0..).map(|(&set, bit)| u32::from(set) << bit).sum()
+    let bits = [
+        traced.reflection,
+        traced.transmission,
+        traced.diffusion,
+        traced.coat,
+    ];
+    bits.iter()
+        .zip(0..)
+        .map(|(&set, bit)| u32::from(set) << bit)
+        .sum()
 }
 
 /// Beams sorted by their surfaces, in the order they are given, and where those of each surface begin.

@@ -78,9 +78,9 @@ fn texture(numbers: &mut Numbers, sampler: usize) -> TextureRef {
 
 /// A material that has each kind of texture, or has it not, by the bits of its number.
 fn material(numbers: &mut Numbers, number: usize) -> Material {
-    let mut some = |bit: usize| (number * 7 >> bit & 1 == 0).then(|| texture(numbers, (number * 11 + bit) % 72));
-    let textures = [(); 11].map(|()| ()).iter().enumerate().map(|(bit, ())| some(bit));
-    let textures: Vec<Option<TextureRef>> = textures.collect();
+    let mut some =
+        |bit: usize| (number * 7 >> bit & 1 == 0).then(|| texture(numbers, (number * 11 + bit) % 72));
+    let textures: Vec<Option<TextureRef>> = (0..11).map(&mut some).collect();
     Material {
         base_color: color(numbers).extend(part(numbers)),
         base_color_texture: textures[0],
@@ -93,7 +93,11 @@ fn material(numbers: &mut Numbers, number: usize) -> Material {
         occlusion_strength: part(numbers),
         emissive: color(numbers),
         emissive_texture: textures[4],
-        alpha_mode: [AlphaMode::Opaque, AlphaMode::Mask { cutoff: 0.3 }, AlphaMode::Blend][number / 2 % 3],
+        alpha_mode: [
+            AlphaMode::Opaque,
+            AlphaMode::Mask { cutoff: 0.3 },
+            AlphaMode::Blend,
+        ][number / 2 % 3],
         unlit: number % 13 == 12,
         transmission: [0.0, part(numbers)][number / 3 % 2],
         transmission_texture: textures[7],
@@ -144,20 +148,32 @@ fn geometry(left_out: Option<usize>) -> FrameGeometry {
     let normals = (0..vertices(0)).map(|i| {
         let own = numbers.point().normalize_or(Vec3::Z) * 0.3;
         let plane = points[i / 3 * 3..i / 3 * 3 + 3].to_vec();
-        let plane = (plane[1] - plane[0]).cross(plane[2] - plane[0]).normalize_or(Vec3::Z);
-        if i / 3 % 7 == 6 { Vec3::ZERO } else { (plane + own).normalize() }
+        let plane = (plane[1] - plane[0])
+            .cross(plane[2] - plane[0])
+            .normalize_or(Vec3::Z);
+        if i / 3 % 7 == 6 {
+            Vec3::ZERO
+        } else {
+            (plane + own).normalize()
+        }
     });
     let normals = normals.collect();
     let side = |x: f32| if x < 0.0 { -1.0 } else { 1.0 };
     let tangents = (0..vertices(1)).map(|i| {
         let along = numbers.point().normalize_or(Vec3::X);
-        if i / 3 % 5 == 4 { Vec4::ZERO } else { along.extend(side((i / 3 % 2) as f32 - 0.5)) }
+        if i / 3 % 5 == 4 {
+            Vec4::ZERO
+        } else {
+            along.extend(side((i / 3 % 2) as f32 - 0.5))
+        }
     });
     let tangents = tangents.collect();
     let mut uv = |_: usize| Vec2::new(numbers.next(), numbers.next()) * 2.5;
     let uvs = (0..vertices(2)).map(&mut uv).collect();
     let uvs1 = (0..vertices(3)).map(&mut uv).collect();
-    let colors = (0..vertices(4)).map(|_| color(&mut numbers).extend(part(&mut numbers))).collect();
+    let colors = (0..vertices(4))
+        .map(|_| color(&mut numbers).extend(part(&mut numbers)))
+        .collect();
     FrameGeometry {
         x: points.iter().map(|p| p.x).collect(),
         y: points.iter().map(|p| p.y).collect(),
@@ -176,6 +192,7 @@ fn geometry(left_out: Option<usize>) -> FrameGeometry {
                 vertices: 3 * i * OF_A_MATERIAL..3 * (i + 1) * OF_A_MATERIAL,
                 material: i,
                 node: 0,
+                double_sided: true,
             })
             .collect(),
         ..FrameGeometry::default()
@@ -254,18 +271,30 @@ fn surfaces_are_the_cpus_but_for_rounding() {
         };
         let mut off = 0;
         for (i, (made, own)) in made.iter().zip(cpu.surfaces(&points)).enumerate() {
-            assert_eq!((made.thin, made.unlit, made.front), (own.thin, own.unlit, own.front));
+            assert_eq!(
+                (made.thin, made.unlit, made.front),
+                (own.thin, own.unlit, own.front)
+            );
             let differs = |(a, b): (&f32, &f32)| (a - b).abs() > 1e-4 * b.abs().max(0.1);
             let (a, b) = (numbers_of(made), numbers_of(&own));
             if a.iter().zip(&b).any(differs) {
                 off += 1;
                 // Rounding decides between two texels or sides of a cutoff here and there, and nothing else.
-                assert!(off <= points.len() / 500, "{left_out:?}: point {i} of {off}: {made:?}\n{own:?}");
+                assert!(
+                    off <= points.len() / 500,
+                    "{left_out:?}: point {i} of {off}: {made:?}\n{own:?}"
+                );
             }
         }
         asked += points.len() as u64;
     }
-    assert_eq!(shading.stats(), ShadeStats { surfaces: asked, beams: 0 });
+    assert_eq!(
+        shading.stats(),
+        ShadeStats {
+            surfaces: asked,
+            beams: 0
+        }
+    );
     assert_eq!(shading.problem(), None);
 }
 
@@ -361,7 +390,11 @@ fn beams(numbers: &mut Numbers, surface: u32) -> Vec<Beam> {
     for k in 0..24 {
         let drawn = [[0, 0], [3, 0], [0, 2], [5, 4]][k as usize % 4];
         let end = numbers.point() * 2.0;
-        let end = if k % 6 == 0 { Light::Directional(end) } else { Light::Point(end) };
+        let end = if k % 6 == 0 {
+            Light::Directional(end)
+        } else {
+            Light::Point(end)
+        };
         let source = Source::Sample {
             light: k % 12,
             end,
@@ -420,7 +453,10 @@ fn light_is_the_cpus_but_for_rounding() {
     let expected = cpu.lit(&alone, &own);
     let mut seen = 0;
     for (i, (made, expected)) in made.iter().zip(&expected).enumerate() {
-        let (off, size) = ((*made - *expected).abs().max_element(), expected.abs().max_element());
+        let (off, size) = (
+            (*made - *expected).abs().max_element(),
+            expected.abs().max_element(),
+        );
         // A mirror's highlight of a point is a thousandth wide: there the rounding of a direction counts as much more.
         let smooth = alone[i].roughness < 0.1 || alone[i].coat.roughness < 0.1;
         let bound = if smooth { 3e-3 } else { 1e-4 };
