@@ -22,6 +22,7 @@ use crate::tile::coverage::Sharing;
 use crate::tile::{TileCounts, TileShader};
 use crate::{
     CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingBuilder, ShadingLight,
+    SurfaceShader,
 };
 
 /// Renders frames of one scene. Keeps what outlives a frame: materials, textures, the topology and clusters.
@@ -144,10 +145,7 @@ impl<'s> Renderer<'s> {
             .iter()
             .map(|l| ShadingLight::new(l, geometry.origin))
             .collect();
-        // The papers' order and references shade one by one.
-        let one_by_one = options.paper || options.reference;
-        let builder = self.shading.as_deref().filter(|_| !one_by_one);
-        let shading = builder.and_then(|builder| builder.build(geometry, &shading_lights));
+        let shading = shading(self.shading.as_deref(), geometry, &shading_lights, options);
         let total = u64::from(structures.eye.tile_count()) * u64::from(samples);
         let done = AtomicU64::new(0);
         let told = || {
@@ -271,6 +269,17 @@ impl<'s> Renderer<'s> {
             }
         }
     }
+}
+
+/// What shades arrays of a frame, if it is not shaded one by one, as the papers' frames and references are.
+fn shading<'g>(
+    builder: Option<&'g dyn ShadingBuilder>,
+    geometry: &'g FrameGeometry,
+    lights: &[ShadingLight],
+    options: &RenderOptions,
+) -> Option<Arc<dyn SurfaceShader + 'g>> {
+    let one_by_one = options.paper || options.reference;
+    builder.filter(|_| !one_by_one)?.build(geometry, lights)
 }
 
 /// What was counted.

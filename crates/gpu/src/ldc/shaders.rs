@@ -263,6 +263,19 @@ mod tests {
         same_layout!(LOOK, "Place", Place, cell, depth, rate, pad);
         same_layout!(SKIN, "Influence", Influence, joints, shares);
         same_layout!(SKIN, "Skin", Skin, corner, vertices, per_side);
+        for program in [SAMPLED, EXACT, TREE, LOOK] {
+            same_layout!(
+                program, "Ray", TexelRay, origin, end, dir, t_min, t_max, before, skip, pad
+            );
+            same_layout!(
+                program, "Found", Found, t, prim, state, cells, texels, samples, triangles, pad
+            );
+            same_layout!(program, "Query", Query, rays, test, tolerance, any);
+        }
+    }
+
+    #[test]
+    fn what_surfaces_are_made_of_is_laid_out_as_in_the_shaders() {
         same_layout!(
             SURFACES, "Shading", Shading, points, normals, tangents, colors, uvs, uvs1, pad_a, pad_b, srgb
         );
@@ -317,6 +330,10 @@ mod tests {
             pad_b
         );
         same_layout!(SURFACES, "Level", Level, width, height, first, pad);
+    }
+
+    #[test]
+    fn light_is_laid_out_as_in_the_shaders() {
         same_layout!(LIT, "Lit", Lit, surfaces, pad_a, pad_b, pad_c);
         same_layout!(
             LIT,
@@ -348,6 +365,10 @@ mod tests {
             drawn_diffuse,
             pad
         );
+    }
+
+    #[test]
+    fn surfaces_are_laid_out_as_in_the_shaders() {
         for program in [SURFACES, LIT] {
             same_layout!(
                 program,
@@ -376,15 +397,6 @@ mod tests {
                 pad_a,
                 pad_b
             );
-        }
-        for program in [SAMPLED, EXACT, TREE, LOOK] {
-            same_layout!(
-                program, "Ray", TexelRay, origin, end, dir, t_min, t_max, before, skip, pad
-            );
-            same_layout!(
-                program, "Found", Found, t, prim, state, cells, texels, samples, triangles, pad
-            );
-            same_layout!(program, "Query", Query, rays, test, tolerance, any);
         }
     }
 }

@@ -79,7 +79,7 @@ fn texture(numbers: &mut Numbers, sampler: usize) -> TextureRef {
 /// A material that has each kind of texture, or has it not, by the bits of its number.
 fn material(numbers: &mut Numbers, number: usize) -> Material {
     let mut some =
-        |bit: usize| (number * 7 >> bit & 1 == 0).then(|| texture(numbers, (number * 11 + bit) % 72));
+        |bit: usize| (((number * 7) >> bit) & 1 == 0).then(|| texture(numbers, (number * 11 + bit) % 72));
     let textures: Vec<Option<TextureRef>> = (0..11).map(&mut some).collect();
     Material {
         base_color: color(numbers).extend(part(numbers)),
@@ -209,7 +209,7 @@ fn points(geometry: &FrameGeometry, each: u32) -> Vec<SurfacePoint> {
         }
         let plane = triangles(geometry).normal(prim).as_vec3().normalize();
         // Not seen edge-on: there rounding decides which side is seen.
-        let view = (plane * if i % 2 == 0 { 1.0 } else { -1.0 } + numbers.point() * 0.6).normalize();
+        let view = (plane * if i.is_multiple_of(2) { 1.0 } else { -1.0 } + numbers.point() * 0.6).normalize();
         // From a share of a texel to many.
         let footprint = [0.0, 1e-4, 0.02, 0.3][i as usize / 2 % 4] * (0.3 + part(&mut numbers));
         SurfacePoint {
@@ -320,12 +320,12 @@ fn random_surface(numbers: &mut Numbers, i: usize) -> Surface {
         specular: part(numbers),
         transmission: [0.0, part(numbers)][i / 3 % 2],
         ior: 1.1 + part(numbers),
-        thin: i / 5 % 2 == 0,
+        thin: (i / 5).is_multiple_of(2),
         absorption: Vec3::ZERO,
         emissive: color(numbers),
         occlusion: part(numbers),
         unlit: i % 17 == 16,
-        front: i / 7 % 2 == 0,
+        front: (i / 7).is_multiple_of(2),
         coat: SurfaceCoat {
             reflectance,
             passed: 1.0 - reflectance,
@@ -377,10 +377,10 @@ fn beams(numbers: &mut Numbers, surface: u32) -> Vec<Beam> {
     };
     let bits = surface as usize;
     let traced = Traced {
-        reflection: bits % 2 == 0,
-        transmission: bits / 2 % 2 == 0,
-        diffusion: bits / 4 % 2 == 0,
-        coat: bits / 8 % 2 == 0,
+        reflection: bits.is_multiple_of(2),
+        transmission: (bits / 2).is_multiple_of(2),
+        diffusion: (bits / 4).is_multiple_of(2),
+        coat: (bits / 8).is_multiple_of(2),
     };
     let mut all = vec![beam(Source::Around {
         radiance: Vec3::new(0.3, 0.4, 0.5),

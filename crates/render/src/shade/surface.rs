@@ -147,6 +147,37 @@ impl Corners {
     }
 }
 
+/// The plane of a triangle as it is seen at a point.
+struct Plane {
+    /// Corner 0.
+    first: Vec3,
+    edges: [Vec3; 2],
+    /// Unit normal, or zero.
+    outward: Vec3,
+    front: bool,
+    /// Area of the pixel's footprint over the doubled area of the triangle.
+    share: f32,
+}
+
+impl Plane {
+    #[inline]
+    fn new(geometry: &FrameGeometry, point: &SurfacePoint) -> Self {
+        let positions = geometry.indices[point.prim as usize].map(|i| geometry.position(i));
+        let edges = [positions[1] - positions[0], positions[2] - positions[0]];
+        let plane = edges[0].as_dvec3().cross(edges[1].as_dvec3());
+        let outward = plane.normalize_or_zero().as_vec3();
+        let cos = outward.dot(point.view);
+        let pixel = point.footprint / cos.abs().max(1e-3);
+        Self {
+            first: positions[0],
+            edges,
+            outward,
+            front: cos >= 0.0,
+            share: pixel * pixel / plane.length() as f32,
+        }
+    }
+}
+
 /// Texture coordinates of a point in one set.
 #[derive(Clone, Copy, Default)]
 struct Coordinates {
@@ -264,21 +295,15 @@ impl<'s> Shader<'s> {
     pub fn surface(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> Surface {
         let material = self.material(geometry, point.object);
         let corners = Corners::new(geometry, point.prim, point.u, point.v);
-        let positions = geometry.indices[point.prim as usize].map(|i| geometry.position(i));
-        let edges = [positions[1] - positions[0], positions[2] - positions[0]];
-        let plane = edges[0].as_dvec3().cross(edges[1].as_dvec3());
-        let outward = plane.normalize_or_zero().as_vec3();
-        let cos = outward.dot(point.view);
-        let front = cos >= 0.0;
+        let Plane {
+            first,
+            edges,
+            outward,
+            front,
+            share,
+        } = Plane::new(geometry, point);
         let geometric_normal = if front { outward } else { -outward };
-
-        let pixel = point.footprint / cos.abs().max(1e-3);
-        let lookup = self.lookup(
-            geometry,
-            &corners,
-            material,
-            pixel * pixel / plane.length() as f32,
-        );
+        let lookup = self.lookup(geometry, &corners, material, share);
         let base = base_color(geometry, &corners, material, &lookup);
         let arm = lookup
             .get(&material.metallic_roughness_texture)
@@ -302,7 +327,7 @@ impl<'s> Shader<'s> {
             shading_normal(geometry, &corners, map, &lookup, edges, sides)
         };
         Surface {
-            position: positions[0] + edges[0] * point.u + edges[1] * point.v,
+            position: first + edges[0] * point.u + edges[1] * point.v,
             geometric_normal,
             normal: normal((&material.normal_texture, material.normal_scale)),
             view: point.view,
@@ -322,6 +347,15 @@ impl<'s> Shader<'s> {
             front,
             coat: coat(&material.coat, &lookup, [point.view, geometric_normal], normal),
         }
+    }
+
+    /// The alpha of [`Self::surface`] alone.
+    pub fn coverage(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> f32 {
+        let material = self.material(geometry, point.object);
+        let corners = Corners::new(geometry, point.prim, point.u, point.v);
+        let share = Plane::new(geometry, point).share;
+        let lookup = self.lookup(geometry, &corners, material, share);
+        material.coverage(base_color(geometry, &corners, material, &lookup).w)
     }
 
     /// The surface of a solid where a ray crosses it. A solid has a volume, whatever the thickness of its material, and no

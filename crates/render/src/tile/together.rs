@@ -35,10 +35,20 @@ impl TileShader<'_> {
         }
     }
 
-    /// Makes an array of surfaces.
+    /// Makes an array of surfaces. What masked and blended ones cover decides what is seen behind them, so it is that of the
+    /// CPU to the bit.
     pub(crate) fn surfaces(&self, shading: &dyn SurfaceShader, points: &[SurfacePoint]) -> Vec<Surface> {
-        let made = shading.surfaces(points);
-        made.unwrap_or_else(|| self.on_cpu().surfaces(points))
+        let Some(mut made) = shading.surfaces(points) else {
+            return self.on_cpu().surfaces(points);
+        };
+        if self.structures.transparent {
+            for (surface, point) in made.iter_mut().zip(points) {
+                if !self.shader.is_opaque(self.geometry, point.object) {
+                    surface.alpha = self.shader.coverage(self.geometry, point);
+                }
+            }
+        }
+        made
     }
 
     /// What surfaces send of the light of their beams.
