@@ -198,8 +198,8 @@ fn built_in_scenes_as_they_are_look_the_same() {
         let scene = builtin::build(name).expect("a built-in scene");
         let (films, surfaces) = both(&device, &scene, None, &small());
         check(name, &films);
-        // Those of solids are not made there.
-        assert!(surfaces > 96 * 64 / 4 || name == "solids", "{name}: {surfaces}");
+        // Of solids it makes none.
+        assert!(surfaces > 500 || name == "solids", "{name}: {surfaces}");
     }
 }
 
