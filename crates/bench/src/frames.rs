@@ -9,7 +9,7 @@ use serde::Serialize;
 use crate::contender::{Contender, FrameKind, Job};
 use crate::embree::{self, Library, Quality};
 use crate::ours::{Rayward, Ways, tile_side};
-use crate::peers::{Obvhs, ObvhsTree, RegularGrid};
+use crate::peers::{BvhOfShapes, Obvhs, ObvhsTree, RegularGrid};
 use crate::{BenchScene, Difference, Machine, Picture, Result, Stopwatch, Time, Times, workers};
 
 /// Share of the pixels in which a picture may differ: rays of f32 peers through edges and along grazing surfaces.
@@ -191,6 +191,7 @@ fn contenders<'s>(
     if options.peers {
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Wide)));
         contenders.push(Box::new(Obvhs::build(&triangles, ObvhsTree::Binary)));
+        contenders.push(Box::new(BvhOfShapes::build(&triangles)));
     }
     if options.regular_grid {
         contenders.push(Box::new(RegularGrid::build(triangles)));

@@ -105,6 +105,10 @@ fn options(quick: bool) -> RenderOptions {
 fn render(name: &str, options: &RenderOptions, cube: bool) -> Result<(Film, usize)> {
     let scene = scene::builtin::build(name)?;
     let frame = scene.at(0.0);
+    let options = &RenderOptions {
+        ambient: scene.ambient,
+        ..*options
+    };
     let mut renderer = Renderer::new(&scene);
     if cube {
         renderer.set_secondary(Arc::new(CubeBuilder::default()));

@@ -155,6 +155,7 @@ impl Job<'_> {
         let pose_ms = milliseconds(pose.elapsed());
         let options = RenderOptions {
             lens: lens(&args.picture, &view.camera, &geometry),
+            ambient: args.picture.ambient.unwrap_or(view.ambient),
             ..self.options
         };
         let seen = (&geometry, &view);

@@ -344,7 +344,8 @@ pub(crate) struct PictureArgs {
     /// Linear colour where nothing is seen, r,g,b, also before an environment
     #[arg(long, value_name = "COLOR", value_parser = values::color)]
     pub(crate) background: Option<Vec3>,
-    /// Linear colour of the light from all around, r,g,b
+    /// Linear colour of the light from all around, r,g,b; 0.1 where lights are made up and in built-in scenes, none with
+    /// lights of a file or the command line
     #[arg(long, value_name = "COLOR", value_parser = values::color, conflicts_with = "environment")]
     pub(crate) ambient: Option<Vec3>,
     /// Longest chain of reflections and refractions; 0 traces none

@@ -59,6 +59,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
     let show = |progress| bar.show(progress);
     let options = RenderOptions {
         lens: lens(&args.picture, &view.camera, &frame),
+        ambient: args.picture.ambient.unwrap_or(view.ambient),
         ..options
     };
     let close = |seconds| {
@@ -246,7 +247,6 @@ pub(crate) fn options(args: &PictureArgs) -> RenderOptions {
         samples: args.samples,
         seed: args.seed,
         tinted_shadows: args.tinted_shadows,
-        ambient: args.ambient.unwrap_or(defaults.ambient),
         background: args.background.unwrap_or(defaults.background),
         show_environment: args.background.is_none(),
         bounces: args.bounces,

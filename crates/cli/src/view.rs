@@ -47,6 +47,8 @@ pub(crate) struct View {
     pub(crate) camera_origin: Origin,
     pub(crate) lights: Vec<PosedLight>,
     pub(crate) lights_origin: Origin,
+    /// Light from all around, unless the arguments say otherwise.
+    pub(crate) ambient: Vec3,
 }
 
 impl View {
@@ -95,11 +97,17 @@ impl View {
         } else {
             (scene::default_lights(&camera), Origin::MadeUp)
         };
+        let ambient = match lights_origin {
+            // Lights that are named shine alone.
+            Origin::CommandLine | Origin::CameraFile => Vec3::ZERO,
+            Origin::Scene | Origin::Environment | Origin::MadeUp => input.scene.ambient,
+        };
         Ok(Self {
             camera,
             camera_origin,
             lights,
             lights_origin,
+            ambient,
         })
     }
 }

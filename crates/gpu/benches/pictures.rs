@@ -208,6 +208,7 @@ fn main() {
             width,
             height,
             bounces: 4,
+            ambient: scene.ambient,
             pixel_samples: if test { 1 } else { 4 },
             ..RenderOptions::default()
         };

@@ -7,6 +7,7 @@ fn main() -> rayward::Result<()> {
     let options = RenderOptions {
         width: 320,
         height: 180,
+        ambient: scene.ambient,
         ..RenderOptions::default()
     };
     let mut renderer = Renderer::new(&scene);

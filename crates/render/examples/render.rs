@@ -13,6 +13,7 @@ fn main() -> rayward::Result<()> {
     let options = RenderOptions {
         width: 640,
         height: 480,
+        ambient: scene.ambient,
         pixel_samples: 4,
         ..RenderOptions::default()
     };

@@ -118,6 +118,7 @@ impl Layers {
 
 /// One layer of a film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum LayerKind {
     /// Linear colour.
     Color,

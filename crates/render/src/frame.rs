@@ -40,6 +40,7 @@ pub struct Renderer<'s> {
 
 /// A rendered frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct RenderedFrame {
     /// The picture and its layers.
     pub film: Film,
@@ -49,6 +50,7 @@ pub struct RenderedFrame {
 
 /// How far a frame has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Progress {
     /// Tiles done.
     pub done: u64,

@@ -13,7 +13,8 @@
 //!     // A file: scene::load(Path::new("model.glb"), &scene::LoadOptions::default())?
 //!     let scene = scene::builtin::build("courtyard")?;
 //!     let frame = scene.at(1.5); // seconds
-//!     let options = RenderOptions { width: 640, height: 360, ..RenderOptions::default() };
+//!     let ambient = scene.ambient;
+//!     let options = RenderOptions { width: 640, height: 360, ambient, ..RenderOptions::default() };
 //!
 //!     let mut renderer = Renderer::new(&scene);
 //!     let rendered = renderer.render(&frame, &frame.cameras[0], &frame.lights, &options, &|_progress| {})?;

@@ -9,6 +9,7 @@ use crate::structures::LightShadows;
 
 /// How the shadows of a light were found.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LightStats {
     /// Name of the light, possibly empty.
     pub name: String,
@@ -22,6 +23,7 @@ pub struct LightStats {
 
 /// What the metric that a tree is built by predicted, and what became of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct LightSteps {
     /// Shadow rays.
     pub rays: u64,
@@ -33,6 +35,7 @@ pub struct LightSteps {
 
 /// What the rays of a light passed in its tree, counted by all threads.
 #[derive(Debug, Default)]
+#[non_exhaustive]
 pub struct Passed {
     rays: AtomicU64,
     nodes: AtomicU64,

@@ -20,7 +20,8 @@ pub struct RenderOptions {
     pub shadow_structure: ShadowStructure,
     /// Whether blended surfaces colour the light they let through; they dim it otherwise.
     pub tinted_shadows: bool,
-    /// Radiance that surrounds the scene, for surfaces that no light reaches. An environment takes its place.
+    /// Radiance that surrounds the scene, for surfaces that no light reaches: none by default, and
+    /// [`rayward_scene::Scene::ambient`] to see a scene as it is meant. An environment takes its place.
     pub ambient: Vec3,
     /// Radiance where no surface is seen.
     pub background: Vec3,
@@ -68,7 +69,7 @@ impl Default for RenderOptions {
             casters: CasterPolicy::Auto,
             shadow_structure: ShadowStructure::Auto,
             tinted_shadows: false,
-            ambient: Vec3::splat(0.1),
+            ambient: Vec3::ZERO,
             background: Vec3::new(0.44, 0.54, 0.68),
             show_environment: true,
             environment_samples: 16,
@@ -117,6 +118,7 @@ pub enum CasterPolicy {
 
 /// What finds the hard shadows of a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ShadowStructure {
     /// What is predicted to cost the least ([`rayward_trace::ShadowCosts`]); HM08's grid with its parameters.
     #[default]
@@ -144,6 +146,17 @@ impl RenderOptions {
         let (width, height) = (self.width, self.height);
         let all = u64::from(width) * u64::from(height);
         self.shard.map_or(all, |shard| shard.pixels(width, height))
+    }
+
+    /// The part of a pixel's width by which textures are filtered. Each of several shaded samples stands for a part of the
+    /// pixel only, and the mean of all filters the rest; not below an eighth, so that distant textures stay in the cache
+    /// (Pharr, Jakob and Humphreys, *Physically Based Rendering*, 4th ed., §10.1, has the same bounds).
+    pub fn footprint_share(&self) -> f32 {
+        match self.antialias {
+            // One sample is shaded for all.
+            Antialias::Coverage => 1.0,
+            Antialias::Samples => (self.pixel_samples.max(1) as f32).sqrt().recip().max(0.125),
+        }
     }
 
     /// The policy in force: the papers' parameters bring their own.

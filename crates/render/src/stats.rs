@@ -6,6 +6,7 @@ use crate::LightStats;
 
 /// Counts and times of one frame.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct FrameStats {
     /// Triangles in the frame.
     pub triangles: usize,
@@ -41,6 +42,7 @@ pub struct FrameStats {
 
 /// Cost of one structure.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct StructureStats {
     /// What it is for.
     pub name: String,

@@ -355,7 +355,7 @@ impl TileShader<'_> {
             u: hit.u as f32,
             v: hit.v as f32,
             view: (-ray.dir.normalize()).as_vec3(),
-            footprint: self.camera.footprint(hit.t as f32),
+            footprint: self.cone(hit.t as f32).width,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Energy: what a surface reflects under a sky of radiance 1 is its albedo, known in closed form or bounded.
 
 use glam::{DVec3, Vec3};
-use rayward::shade::{Coat, brdf, lobes};
+use rayward::shade::{Anisotropy, Coat, SurfaceFinish, brdf, lobes};
 use rayward::{ShadingLight, Surface, shade};
 use rayward_scene::{LightKind, PosedLight};
 
@@ -26,6 +26,7 @@ fn surface(angle: f32, metallic: f32, roughness: f32) -> Surface {
         occlusion: 1.0,
         unlit: false,
         front: true,
+        finish: SurfaceFinish::NONE,
         coat: Coat::NONE,
     }
 }
@@ -131,9 +132,15 @@ fn over_hemisphere(value: impl Fn(Vec3) -> Vec3) -> Vec3 {
 
 #[test]
 fn drawn_reflections_bring_what_the_model_reflects() {
-    for (roughness, metallic) in [(0.3, 1.0), (0.6, 0.0), (1.0, 0.5)] {
+    for (roughness, metallic, strength) in
+        [(0.3, 1.0, 0.0), (0.6, 0.0, 0.0), (1.0, 0.5, 0.0), (0.5, 1.0, 0.7)]
+    {
         for angle in [0.0f32, 0.8, 1.3] {
             let mut surface = surface(angle, metallic, roughness);
+            surface.finish.anisotropy = Anisotropy {
+                strength,
+                direction: Vec3::new(0.8, 0.6, 0.3),
+            };
             surface.base_color = Vec3::new(0.9, 0.5, 0.1);
             let exact = over_hemisphere(|towards| brdf::specular(&surface, towards));
             let mut drawn = Vec3::ZERO;

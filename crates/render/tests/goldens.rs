@@ -21,6 +21,7 @@ fn check(name: &str, scene: &Scene, environment: Option<Environment>, options: R
         width: WIDTH,
         height: HEIGHT,
         pixel_samples: 2,
+        ambient: scene.ambient,
         ..options
     };
     let geometry = scene.at(0.0);

@@ -1,14 +1,17 @@
-//! A camera and a light for scenes that have none.
+//! A camera and lights for scenes that have none.
 //!
 //! The camera looks from the front right and slightly above (30 and 20 degrees), the usual three-quarter view
 //! of a model that faces +Z, and is as near as the bounding box allows. The key light comes from the upper left
-//! of the camera, as readers of shaded pictures expect.
+//! of the camera, as readers of shaded pictures expect, and some light from all around fills what it does not reach.
 
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3, Vec3};
 
 use crate::{FrameGeometry, LightKind, PosedCamera, PosedLight, Projection};
+
+/// Radiance from all around that goes with [`default_lights`], so that nothing is black.
+pub const DEFAULT_AMBIENT: Vec3 = Vec3::splat(0.1);
 
 /// Vertical field of view of the made-up camera, radians.
 const VFOV: f64 = 40.0 * PI / 180.0;

@@ -21,11 +21,14 @@ mod solid;
 pub use camera_file::{
     AreaLight, CameraEntry, find_camera, point_light_for, read_camera_file, square_light_at,
 };
-pub use defaults::{default_camera, default_lights};
+pub use defaults::{DEFAULT_AMBIENT, default_camera, default_lights};
 pub use error::{Error, Notice};
 pub use frame::{FrameGeometry, ObjectRange, PosedCamera, PosedLight, VertexAttributes};
 pub use load::{LoadOptions, UpAxis, load};
-pub use material::{AlphaMode, Coat, Image, Material, Sampler, TextureRef, TextureTransform, Wrap};
+pub use material::{
+    AlphaMode, Anisotropy, Coat, Image, Iridescence, Material, Sampler, Sheen, TextureRef, TextureTransform,
+    Wrap,
+};
 pub use pose::ObjectMotion;
 pub use scene::{
     Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Mesh, MorphTarget, Node,

@@ -58,8 +58,68 @@ pub struct Material {
     pub specular_color: Vec3,
     /// Specular colour (sRGB).
     pub specular_color_texture: Option<TextureRef>,
+    /// A thin film that colours reflections.
+    pub iridescence: Iridescence,
+    /// Fibres that scatter light at grazing angles.
+    pub sheen: Sheen,
+    /// A direction in which the surface is rougher.
+    pub anisotropy: Anisotropy,
     /// What lies over all of that.
     pub coat: Coat,
+}
+
+/// A film as thin as light's wavelengths (`KHR_materials_iridescence`), without one by default.
+#[derive(Clone, Debug)]
+pub struct Iridescence {
+    /// How much of the reflection is the film's, 0 to 1.
+    pub factor: f32,
+    /// Factor in red (linear).
+    pub texture: Option<TextureRef>,
+    /// Index of refraction of the film.
+    pub ior: f32,
+    /// Thickness where the texture is 0, nanometres.
+    pub thickness_min: f32,
+    /// Thickness where the texture is 1, and without a texture, nanometres.
+    pub thickness_max: f32,
+    /// Thickness in green (linear).
+    pub thickness_texture: Option<TextureRef>,
+}
+
+impl Default for Iridescence {
+    fn default() -> Self {
+        Self {
+            factor: 0.0,
+            texture: None,
+            ior: 1.3,
+            thickness_min: 100.0,
+            thickness_max: 400.0,
+            thickness_texture: None,
+        }
+    }
+}
+
+/// The fibres of cloth (`KHR_materials_sheen`), without any by default.
+#[derive(Clone, Debug, Default)]
+pub struct Sheen {
+    /// Linear colour; black is no sheen.
+    pub color: Vec3,
+    /// Texture multiplied with the colour (sRGB).
+    pub color_texture: Option<TextureRef>,
+    /// How far fibres lean away from the normal, 0 to 1.
+    pub roughness: f32,
+    /// Roughness in alpha (linear).
+    pub roughness_texture: Option<TextureRef>,
+}
+
+/// Roughness that depends on the direction (`KHR_materials_anisotropy`), as of brushed metal; none by default.
+#[derive(Clone, Debug, Default)]
+pub struct Anisotropy {
+    /// How much rougher the surface is along the direction, 0 to 1.
+    pub strength: f32,
+    /// Angle from the tangent to the direction, counter-clockwise, radians.
+    pub rotation: f32,
+    /// Direction in red and green, to be turned by the rotation, strength in blue (linear).
+    pub texture: Option<TextureRef>,
 }
 
 /// A clear layer over a surface (`KHR_materials_clearcoat`), without one by default.
@@ -121,6 +181,9 @@ impl Default for Material {
             specular_texture: None,
             specular_color: Vec3::ONE,
             specular_color_texture: None,
+            iridescence: Iridescence::default(),
+            sheen: Sheen::default(),
+            anisotropy: Anisotropy::default(),
             coat: Coat::default(),
         }
     }

@@ -32,6 +32,9 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// Lights, referred to by nodes.
     pub lights: Vec<Light>,
+    /// Radiance from all around that the scene is meant to be seen in, beside its lights: that of the built-in scenes,
+    /// [`crate::DEFAULT_AMBIENT`] for files that place no light, and none for those that do.
+    pub ambient: Vec3,
     /// What the loader skipped, repaired or did not understand; each said once.
     pub notices: Vec<Notice>,
 }

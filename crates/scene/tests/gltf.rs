@@ -7,8 +7,8 @@ use std::f32::consts::FRAC_1_SQRT_2;
 use glam::{DVec3, Mat4, Quat, Vec2, Vec3, Vec4};
 use gltf_builder::{Builder, F32, U8, U16, floats, push};
 use rayward_scene::{
-    AlphaMode, ChannelTarget, Interpolation, LightKind, LoadOptions, Projection, Scene, Transform, UpAxis,
-    Wrap, load,
+    AlphaMode, ChannelTarget, DEFAULT_AMBIENT, Interpolation, LightKind, LoadOptions, Projection, Scene,
+    Transform, UpAxis, Wrap, load,
 };
 use serde_json::json;
 
@@ -250,6 +250,10 @@ fn cameras_and_lights() {
         }
     );
     assert_eq!(scene.lights[1].kind, LightKind::Directional { half_angle: 0.0 });
+    assert_eq!(scene.ambient, Vec3::ZERO);
+    // Lights that stand nowhere light nothing.
+    file.json["nodes"][0]["extensions"] = json!({});
+    assert_eq!(file.load().expect("a sound file").ambient, DEFAULT_AMBIENT);
 }
 
 /// A file with a PNG of two texels as texture 0.
@@ -266,6 +270,44 @@ fn textured() -> Builder {
     file.json["textures"] = json!([{"source": 1, "sampler": 0}]);
     file.primitive()["material"] = json!(0);
     file
+}
+
+#[test]
+fn films_sheen_and_anisotropy() {
+    let mut file = textured();
+    let moved = json!({"index": 0, "texCoord": 1});
+    file.json["materials"] = json!([{"extensions": {
+        "KHR_materials_iridescence": {"iridescenceFactor": 0.9, "iridescenceTexture": moved, "iridescenceIor": 1.7,
+            "iridescenceThicknessMinimum": 200, "iridescenceThicknessMaximum": 900,
+            "iridescenceThicknessTexture": {"index": 0}},
+        "KHR_materials_sheen": {"sheenColorFactor": [0.1, 0.2, 0.3], "sheenColorTexture": moved,
+            "sheenRoughnessFactor": 0.4, "sheenRoughnessTexture": {"index": 0}},
+        "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": -1.2,
+            "anisotropyTexture": moved}}},
+        {"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 7}}}]);
+    let scene = file.load().expect("a sound file");
+    let m = &scene.materials[1];
+    let sets = [m.iridescence.texture, m.iridescence.thickness_texture];
+    assert_eq!(sets.map(|t| t.expect("a texture").uv_set), [1, 0]);
+    let film = &m.iridescence;
+    assert_eq!((film.factor, film.ior), (0.9, 1.7));
+    assert_eq!((film.thickness_min, film.thickness_max), (200.0, 900.0));
+    let sheen = &m.sheen;
+    assert_eq!((sheen.color, sheen.roughness), (Vec3::new(0.1, 0.2, 0.3), 0.4));
+    assert_eq!([sheen.color_texture, sheen.roughness_texture], sets);
+    assert_eq!((m.anisotropy.strength, m.anisotropy.rotation), (0.5, -1.2));
+    assert_eq!(m.anisotropy.texture, sets[0]);
+    let usual = &scene.materials[2].iridescence;
+    assert_eq!((usual.factor, usual.ior), (1.0, 1.3));
+    assert_eq!((usual.thickness_min, usual.thickness_max), (100.0, 400.0));
+
+    file.json["materials"] =
+        json!([{"extensions": {"KHR_materials_sheen": {"sheenRoughnessFactor": "much"}}}]);
+    let error = file.load().expect_err("no number").to_string();
+    assert!(
+        error.contains("material 0") && error.contains("KHR_materials_sheen"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! A shadow ray goes from the hit, as f32 arithmetic finds it, to the light; its ends are cut off by a ten-thousandth of
 //! its length, as is usual where hits are not exact.
 
+mod bvh;
 mod obvhs;
 mod regular;
 
@@ -13,6 +14,7 @@ use crate::contender::{Contender, FrameKind, Job, PATTERN, SOFT_SAMPLES};
 use crate::packet::{LANES, Lanes, NOTHING, Packet, Rays, Valid};
 use crate::{Picture, Time};
 
+pub(crate) use bvh::BvhOfShapes;
 pub(crate) use obvhs::{Obvhs, ObvhsTree};
 pub(crate) use regular::RegularGrid;
 

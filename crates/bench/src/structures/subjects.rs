@@ -14,7 +14,7 @@ use crate::contender::{FrameKind, Job, SOFT_SAMPLES, sample_set};
 use crate::embree::{Library, Quality};
 use crate::ours::{Rayward, Ways, eye_grid};
 use crate::packet::{LANES, NOTHING, Packet, Valid};
-use crate::peers::{CUT, Obvhs, ObvhsTree, PacketTracer, Peer};
+use crate::peers::{BvhOfShapes, CUT, Obvhs, ObvhsTree, PacketTracer, Peer};
 use crate::{BenchScene, Result, Stopwatch, Time};
 
 type Answering<'s> = dyn Fn(&RaySet, &mut Vec<Answer>) -> bool + Send + Sync + 's;
@@ -103,6 +103,7 @@ pub(super) fn all<'s>(
         for tree in [ObvhsTree::Wide, ObvhsTree::Binary] {
             subjects.push(peer(Obvhs::build(&triangles, tree), "library, ray by ray"));
         }
+        subjects.push(peer(BvhOfShapes::build(&triangles), "library, ray by ray"));
         for library in libraries {
             for quality in Quality::ALL {
                 subjects.push(peer(

@@ -302,6 +302,63 @@ fn animations_are_chosen_by_name_or_index() {
     }
 }
 
+/// A glTF of one triangle, with a light that shines along it and so reaches nothing.
+const LAMP: &str = r#"{ "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0] }],
+    "extensionsUsed": ["KHR_lights_punctual"],
+    "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "directional" }] } },
+    "nodes": [{ "mesh": 0, "children": [1] },
+        { "rotation": [0, 0.70710678, 0, 0.70710678], "extensions": { "KHR_lights_punctual": { "light": 0 } } }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+    "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
+        "min": [0, 0, 0], "max": [1, 1, 0] }],
+    "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+    "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }] }"#;
+
+#[test]
+fn light_from_all_around_goes_with_lights_that_are_made_up() {
+    let folder = Folder::new();
+    folder.file("triangle.obj", TRIANGLE);
+    folder.file("lamp.gltf", LAMP);
+    let entry = r#"{"triangle": {"eye": [0, 0, 4], "target": [0, 0, 0], "point_light": [3, 1, 2]}}"#;
+    folder.file("cameras.json", entry);
+    let picture = |source: &[&str], ambient: &[&str]| {
+        let size = ["--resolution", "32x24", "-q", "-o", "x.png"];
+        folder
+            .run(&[&["render"], source, ambient, &size].concat())
+            .expect(0);
+        std::fs::read(folder.path("x.png")).expect("the picture")
+    };
+    for (source, ambient) in [
+        (&["triangle.obj"][..], "0.1,0.1,0.1"),
+        (&["--builtin", "blob-1k"], "0.1,0.1,0.1"),
+        (&["lamp.gltf"], "0,0,0"),
+        (&["--builtin", "blob-1k", "--light", "sun:1,1,1"], "0,0,0"),
+        (&["triangle.obj", "--camera-file", "cameras.json"], "0,0,0"),
+    ] {
+        let seen = picture(source, &[]);
+        assert!(seen == picture(source, &["--ambient", ambient]), "{source:?}");
+        assert!(
+            seen != picture(source, &["--ambient", "0.2,0.2,0.2"]),
+            "{source:?}"
+        );
+    }
+    folder
+        .run(&[
+            "animate",
+            "lamp.gltf",
+            "--frames",
+            "0..1",
+            "--resolution",
+            "32x24",
+            "-q",
+            "-o",
+            "f#.png",
+        ])
+        .expect(0);
+    let frame = std::fs::read(folder.path("f0.png")).expect("the frame");
+    assert!(frame == picture(&["lamp.gltf"], &["--ambient", "0,0,0"]));
+}
+
 #[test]
 fn lights_change_the_picture() {
     let folder = Folder::new();

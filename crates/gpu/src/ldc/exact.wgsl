@@ -24,8 +24,8 @@ fn answer(index: u32, ray: Ray) -> Found {
         var w = walk_start(ray, order[i], steps);
         let slack = PLANE_SLACK + depth_error(order[i]);
         while !settled(best) && walk_next(&w, t_end, REACH) {
-            for (var s = w.first; s < w.last; s++) {
-                let sample = sample_at(s, order[i]);
+            var near = near_ray(w, slack + PLANE_REACH);
+            for (var sample = next_near(&w, &near); sample.id != NONE; sample = next_near(&w, &near)) {
                 let id = sample.id;
                 let off = above(w, sample.depth, slopes_of(sample.slopes));
                 let passes = min(off.x, off.y) > slack || max(off.x, off.y) < -slack;

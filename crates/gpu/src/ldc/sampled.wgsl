@@ -44,15 +44,15 @@ fn answer(index: u32, ray: Ray) -> Found {
     for (var i = 0u; i < 3u; i++) {
         var w = walk_start(ray, order[i], steps);
         let lateral = 1.0 / max(length(w.dir.xy), 1e-20);
+        // Beyond its texel the ray has other depths.
+        let beyond = query.tolerance * (2.0 + 1.01 * abs(w.dir.z) * lateral);
+        let reach = select(query.tolerance + 0.015625, PLANE_REACH + beyond, query.test == PLANE);
         var own = FAR;
         var own_prim = NONE;
         while own == FAR && walk_next(&w, t_end, pad) {
-            for (var s = w.first; s < w.last; s++) {
-                let sample = sample_at(s, order[i]);
+            var near = near_ray(w, reach);
+            for (var sample = next_near(&w, &near); sample.id != NONE; sample = next_near(&w, &near)) {
                 let id = sample.id;
-                if id == NONE {
-                    break;
-                }
                 let t = sample_hit(w, sample.depth, slopes_of(sample.slopes), lateral);
                 let counts = t < FAR && t > ray.t_min && t <= ray.t_max && id != ray.skip;
                 if counts && (t < own || (t == own && id < own_prim)) {

@@ -1,4 +1,5 @@
-// Each texel's samples by depth, then id; with centre coverage those of equal depth are left out but the first.
+// Each texel's samples by depth, then id; with centre coverage those of equal depth are left out but the first. With
+// conservative coverage what has no plane, and so may be met at any depth, comes before all others.
 
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> samples: array<u32>;
@@ -6,6 +7,9 @@
 fn before(a: vec3u, b: vec3u) -> bool {
     let ka = key(bitcast<f32>(a.y));
     let kb = key(bitcast<f32>(b.y));
+    if frame.conservative == 1u && (a.z == NO_PLANE) != (b.z == NO_PLANE) {
+        return a.z == NO_PLANE;
+    }
     return ka < kb || (ka == kb && a.x < b.x);
 }
 

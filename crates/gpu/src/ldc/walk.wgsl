@@ -128,7 +128,6 @@ fn walk_next(w: ptr<function, Walk>, t_end: f32, pad: f32) -> bool {
         (*w).first = starts[texel];
         (*w).last = starts[texel + 1u];
         if (*w).first < (*w).last {
-            (*w).steps.z += (*w).last - (*w).first;
             (*w).ends = ends;
             return true;
         }
@@ -174,6 +173,64 @@ fn sample_at(s: u32, axis: u32) -> Sample {
 fn slopes_of(packed: u32) -> vec2f {
     let bytes = vec2i(vec2u(packed << 24u, packed << 16u)) >> vec2u(24u);
     return select(vec2f(bytes) / 127.0, vec2f(0.0), packed == NO_PLANE);
+}
+
+// How far a sample's plane departs from its depth over the texel: slopes are at most 1 either way.
+const PLANE_REACH: f32 = 1.015625;
+
+// The samples of the texel found that may count, those within reach of the ray's depths: samples are sorted. Where what
+// has no plane comes before all others, it counts at any depth.
+struct Near {
+    next: u32,
+    // First of those that are sorted and not below the ray.
+    start: u32,
+    high: f32,
+}
+
+// Whether a sample's depth says where it counts.
+fn by_depth(sample: Sample) -> bool {
+    return sample.slopes != NO_PLANE || frame.conservative == 0u;
+}
+
+fn near_ray(w: Walk, reach: f32) -> Near {
+    let depths = w.origin.z + w.ends * w.dir.z;
+    let low = min(depths.x, depths.y) - reach;
+    var start = w.first;
+    var end = w.last;
+    while start < end {
+        let middle = (start + end) / 2u;
+        let sample = sample_at(middle, w.axis);
+        if sample.id != NONE && (!by_depth(sample) || sample.depth < low) {
+            start = middle + 1u;
+        } else {
+            end = middle;
+        }
+    }
+    return Near(w.first, start, max(depths.x, depths.y) + reach);
+}
+
+// The next of them; its id is NONE if there is none.
+fn next_near(w: ptr<function, Walk>, near: ptr<function, Near>) -> Sample {
+    let nothing = Sample(NONE, 0.0, 0u);
+    if (*near).next >= (*w).last {
+        return nothing;
+    }
+    var sample = sample_at((*near).next, (*w).axis);
+    if by_depth(sample) {
+        if (*near).next < (*near).start {
+            (*near).next = (*near).start;
+            if (*near).next >= (*w).last {
+                return nothing;
+            }
+            sample = sample_at((*near).next, (*w).axis);
+        }
+        if sample.id == NONE || sample.depth > (*near).high {
+            return nothing;
+        }
+    }
+    (*near).next += 1u;
+    (*w).steps.z += 1u;
+    return sample;
 }
 
 // How far a sample's plane lies below the ray at both ends of its way through the sample's texel.

@@ -13,7 +13,7 @@
 //! Layout: 4 bytes a texel; a frame takes 32 bytes a triangle and 12 to 72 a vertex. A surface is 160 bytes each way, a beam
 //! 64. Cost: two submissions a tile, and two more for each wave of rays from it. Limits: attributes of all vertices in one
 //! binding, 1.8 million vertices if they have all of them; 2^32 texels. Texture coordinates that are not finite show any texel.
-//! On the CPU remain: surfaces of solids, directions and radiance of an environment, lights as mirrors show them, and frames
+//! On the CPU remain: surfaces with a film, sheen or anisotropy and their light, surfaces of solids, directions and radiance of an environment, lights as mirrors show them, and frames
 //! with a lens or a shutter as a whole.
 
 pub(crate) mod layout;

@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use rayward::scene::{AlphaMode, FrameGeometry, Sampler, Wrap};
-use rayward::shade::{Coat, Distribution, ShaderMaterial, Traced};
+use rayward::shade::{Coat, Distribution, ShaderMaterial, SurfaceFinish, Traced};
 use rayward::texture::{Encoding, Texture};
 use rayward::trace::Light;
 use rayward::{Beam, ShadingLight, Source, Surface, SurfacePoint, triangles};
@@ -197,6 +197,7 @@ pub(super) fn surface(row: &Row) -> Surface {
         occlusion: row.occlusion,
         unlit: row.flags & UNLIT != 0,
         front: row.flags & FRONT != 0,
+        finish: SurfaceFinish::NONE,
         coat: Coat {
             reflectance: row.coat_reflectance,
             passed: row.coat_passed,

@@ -7,7 +7,7 @@ use rayward::scene::{
     AlphaMode, Coat, FrameGeometry, Image, LightKind, Material, ObjectRange, PosedLight, Sampler, Scene,
     TextureRef, TextureTransform, VertexAttributes, Wrap,
 };
-use rayward::shade::{Coat as SurfaceCoat, Traced};
+use rayward::shade::{Coat as SurfaceCoat, SurfaceFinish, Traced};
 use rayward::trace::Light;
 use rayward::{
     Beam, CpuShading, Shader, ShadingBuilder, ShadingLight, Source, Surface, SurfacePoint, triangles,
@@ -326,6 +326,7 @@ fn random_surface(numbers: &mut Numbers, i: usize) -> Surface {
         occlusion: part(numbers),
         unlit: i % 17 == 16,
         front: (i / 7).is_multiple_of(2),
+        finish: SurfaceFinish::NONE,
         coat: SurfaceCoat {
             reflectance,
             passed: 1.0 - reflectance,

@@ -23,7 +23,7 @@ use rayward_trace::{AreaLight, Light, exact};
 use super::{Arrival, BounceWork, Flight, GLOSSY, SURROUNDING, absorbed};
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{LightRays, direct, direct_beside, lobes, lobes_lit};
+use crate::shade::{Iridescence, LightRays, SurfaceFinish, direct, direct_beside, lobes, lobes_lit};
 use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
@@ -47,6 +47,10 @@ pub(super) fn lit_surface(arrival: &Arrival) -> Surface {
         metallic: 0.0,
         f0: Vec3::ZERO,
         specular: 0.0,
+        finish: SurfaceFinish {
+            iridescence: Iridescence::NONE,
+            ..surface.finish
+        },
         ..surface
     }
 }

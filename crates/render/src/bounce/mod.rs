@@ -106,10 +106,10 @@ impl Flight {
     }
 }
 
-/// Width of the pixel's footprint along a ray, metres, and its growth per metre.
+/// Width of a sample's footprint along a ray, metres, and its growth per metre.
 #[derive(Clone, Copy, Debug)]
-struct Cone {
-    width: f32,
+pub(crate) struct Cone {
+    pub(crate) width: f32,
     spread: f32,
 }
 
@@ -271,14 +271,15 @@ impl TileShader<'_> {
         }
     }
 
-    /// The footprint of a pixel where its ray has this depth.
-    fn cone(&self, depth: f32) -> Cone {
+    /// The footprint of a sample where its ray has this depth.
+    pub(crate) fn cone(&self, depth: f32) -> Cone {
+        let share = self.options.footprint_share();
         Cone {
-            width: self.camera.footprint(depth),
+            width: self.camera.footprint(depth) * share,
             spread: if self.camera.orthographic {
                 0.0
             } else {
-                self.camera.footprint(1.0)
+                self.camera.footprint(1.0) * share
             },
         }
     }
@@ -489,7 +490,8 @@ impl TileShader<'_> {
 
     /// As [`Self::rays`], of diffuse light.
     fn diffused_rays(&self, surface: &Surface, sharp: f32) -> u32 {
-        self.rays(sharp, false, surface.base_color.max_element())
+        let share = surface.base_color.max(surface.finish.sheen.reflectance);
+        self.rays(sharp, false, share.max_element())
     }
 
     /// How many directions to the environment a surface draws.

@@ -429,7 +429,7 @@ impl Frame<'_> {
             u: hit.u as f32,
             v: hit.v as f32,
             view: (-ray.dir).normalize(),
-            footprint: self.camera.open.footprint(hit.t as f32),
+            footprint: self.camera.open.footprint(hit.t as f32) * self.options.footprint_share(),
         };
         let opening = self.shader.surface(self.open, &point);
         if self.moving.corners(prim, 1.0) == self.moving.corners(prim, 0.0) {

@@ -68,7 +68,7 @@ pub enum Source {
     },
 }
 
-/// Shades arrays of points of one frame.
+/// Shades arrays of points of one frame. Frames ask it for no surface with a [`super::SurfaceFinish`], nor for its light.
 pub trait SurfaceShader: Debug + Send + Sync {
     /// The surfaces at these points, as [`Shader::surface`] has them.
     fn surfaces(&self, points: &[SurfacePoint]) -> Option<Vec<Surface>>;

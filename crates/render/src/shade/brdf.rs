@@ -9,6 +9,8 @@
 //! S = D V: Trowbridge-Reitz (GGX) distribution and height-correlated Smith visibility, alpha = roughness^2
 //! ```
 //!
+//! Films, sheen and anisotropy come in where a surface has them ([`super::SurfaceFinish`]).
+//!
 //! Limits: single scattering, so a metal of roughness 1 seen head on reflects 31 % only; the specification's mix
 //! lets smooth white dielectrics gain light at grazing views (a third at 86 degrees); alpha is at least
 //! [`MIN_ALPHA`], so that a mirror still shows the highlight of a point light.
@@ -28,9 +30,20 @@ pub fn evaluate(surface: &Surface, towards: Vec3) -> Vec3 {
     diffuse(surface, towards) + specular(surface, towards)
 }
 
-/// The diffuse part of [`evaluate`].
+/// The part of [`evaluate`] that cosine-drawn rays stand for: diffuse light and sheen.
 #[inline]
 pub fn diffuse(surface: &Surface, towards: Vec3) -> Vec3 {
+    let sheen = &surface.finish.sheen;
+    let below = lambertian(surface, towards) * sheen.passed;
+    if sheen.color == Vec3::ZERO {
+        return below;
+    }
+    below + sheen.evaluate(surface.normal, surface.view, towards) * surface.coat.passed
+}
+
+/// The diffuse light of the metallic-roughness model below the coat.
+#[inline]
+fn lambertian(surface: &Surface, towards: Vec3) -> Vec3 {
     let half = (towards + surface.view).normalize_or(surface.normal);
     let reflected = dielectric_reflectance(surface, surface.view.dot(half));
     let share = (1.0 - surface.metallic) * (1.0 - surface.transmission) / PI;
@@ -46,7 +59,10 @@ pub fn specular(surface: &Surface, towards: Vec3) -> Vec3 {
     // Interpolated normals can lean away from the viewer; there the limit of the model goes on.
     let cos_view = normal.dot(view).max(1e-4);
     let alpha = (surface.roughness * surface.roughness).max(MIN_ALPHA);
-    let lobe = distribution(normal, half, alpha) * visibility(cos_light, cos_view, alpha);
+    let lobe = match surface.finish.anisotropy.facets(normal, alpha) {
+        Some(facets) => facets.distribution(half) * facets.visibility(view, towards),
+        None => distribution(normal, half, alpha) * visibility(cos_light, cos_view, alpha),
+    };
     reflectance(surface, view.dot(half)) * lobe
 }
 
@@ -56,7 +72,9 @@ pub fn reflectance(surface: &Surface, cos: f32) -> Vec3 {
     let grazing = schlick(cos);
     let base = surface.base_color;
     let metal = base + (Vec3::ONE - base) * grazing;
-    dielectric_reflectance(surface, cos).lerp(metal, surface.metallic) * surface.coat.passed
+    let metal = surface.finish.iridescence.over(metal, base, cos);
+    let passed = surface.coat.passed * surface.finish.sheen.passed;
+    dielectric_reflectance(surface, cos).lerp(metal, surface.metallic) * passed
 }
 
 /// What a facet of the dielectric reflects: Schlick's rise from `f0` to 1 or, where light passes, Fresnel's, which
@@ -75,7 +93,9 @@ pub fn dielectric_reflectance(surface: &Surface, cos: f32) -> Vec3 {
     } else {
         schlick(cos)
     };
-    surface.specular * (surface.f0 + (Vec3::ONE - surface.f0) * rise)
+    let bare = surface.specular * (surface.f0 + (Vec3::ONE - surface.f0) * rise);
+    let head_on = surface.specular * surface.f0;
+    surface.finish.iridescence.over(bare, head_on, cos)
 }
 
 /// Fresnel's reflectance of unpolarised light; `ratio` is the index of refraction on the viewer's side over that

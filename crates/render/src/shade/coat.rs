@@ -14,6 +14,7 @@ use glam::Vec3;
 
 use super::Surface;
 use super::brdf::schlick;
+use super::finish::SurfaceFinish;
 use super::lobes::seen_normal;
 
 /// Reflectance of a coat seen head on: that of an index of refraction of 1.5.
@@ -70,6 +71,7 @@ impl Surface {
             specular: self.coat.reflectance,
             transmission: 0.0,
             emissive: Vec3::ZERO,
+            finish: SurfaceFinish::NONE,
             coat: Coat::NONE,
             ..*self
         })

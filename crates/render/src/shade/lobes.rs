@@ -18,6 +18,7 @@ use glam::{Vec2, Vec3};
 
 use super::Surface;
 use super::brdf::{MIN_ALPHA, reflectance};
+use super::finish::anisotropy::Facets;
 
 /// Roughness below which a surface is a mirror, or clear.
 pub const SMOOTH: f32 = 0.0316;
@@ -45,14 +46,14 @@ pub fn reflected(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
             density: f32::INFINITY,
         });
     }
-    let alpha = alpha(surface);
-    let half = visible_facet(normal, view, alpha, random);
+    let facets = facets(surface, normal);
+    let half = visible_facet(&facets, view, random);
     let towards = 2.0 * half.dot(view) * half - view;
     let cos_light = normal.dot(towards);
     if cos_light <= 0.0 || surface.geometric_normal.dot(towards) <= 0.0 {
         return None;
     }
-    let weight = reflectance(surface, view.dot(half)) * lit_share(normal.dot(view), cos_light, alpha);
+    let weight = reflectance(surface, view.dot(half)) * lit_share(surface, normal, towards);
     Some(Lobe {
         towards,
         weight,
@@ -70,7 +71,11 @@ pub fn reflection_density(surface: &Surface, towards: Vec3) -> f32 {
     let alpha = alpha(surface);
     let half = (towards + surface.view).normalize_or(normal);
     // The density of a seen facet over the 4 (v.h) by which reflection spreads directions.
-    super::brdf::distribution(normal, half, alpha) * seen_share(cos_view, alpha) / (4.0 * cos_view)
+    let seen = match surface.finish.anisotropy.facets(normal, alpha) {
+        Some(facets) => facets.distribution(half) * facets.seen_share(surface.view),
+        None => super::brdf::distribution(normal, half, alpha) * seen_share(cos_view, alpha),
+    };
+    seen / (4.0 * cos_view)
 }
 
 /// Where a transmitted ray goes on; `None` for a surface that transmits nothing, and where the drawn facet reflects
@@ -86,10 +91,11 @@ pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
     let half = if smooth {
         normal
     } else {
-        visible_facet(normal, view, alpha(surface), random)
+        visible_facet(&facets(surface, normal), view, random)
     };
     let cos = view.dot(half);
-    let passed = Vec3::ONE - super::brdf::dielectric_reflectance(surface, cos).min(Vec3::ONE);
+    // What is reflected in one colour is not missing in its opposite.
+    let passed = (1.0 - super::brdf::dielectric_reflectance(surface, cos).max_element()).max(0.0);
     let towards = if surface.thin {
         let reflected = 2.0 * cos * half - view;
         // A smooth wall is straight to the last bit, so that what lies behind is seen undistorted.
@@ -108,11 +114,13 @@ pub fn transmitted(surface: &Surface, random: [f32; 2]) -> Option<Lobe> {
     let shadowed = if smooth {
         1.0
     } else {
-        lit_share(normal.dot(view), cos_light, alpha(surface))
+        lit_share(surface, normal, towards)
     };
     Some(Lobe {
         towards: above(towards, -surface.geometric_normal),
-        weight: surface.base_color * passed * (through * shadowed * surface.coat.passed),
+        weight: surface.base_color
+            * passed
+            * (through * shadowed * surface.coat.passed * surface.finish.sheen.passed),
         density: f32::INFINITY,
     })
 }
@@ -143,7 +151,7 @@ pub fn diffusion_density(surface: &Surface, towards: Vec3) -> f32 {
 
 /// Whether reflection and transmission have one direction.
 pub fn is_smooth(surface: &Surface) -> bool {
-    surface.roughness < SMOOTH
+    surface.roughness < SMOOTH && surface.finish.anisotropy.strength == 0.0
 }
 
 /// The direction behind a facet by Snell's law; `ratio` is the index of refraction on the viewer's side over that
@@ -190,8 +198,14 @@ fn seen_share(cos: f32, alpha: f32) -> f32 {
     2.0 * cos / (cos + (a2 + (1.0 - a2) * cos * cos).sqrt())
 }
 
-/// Of the facets that the viewer sees, the share that the light sees too, heights correlated.
-fn lit_share(cos_view: f32, cos_light: f32, alpha: f32) -> f32 {
+/// Of the facets that the viewer sees, the share that the light sees too, heights correlated; the light may be on either
+/// side.
+fn lit_share(surface: &Surface, normal: Vec3, towards: Vec3) -> f32 {
+    let alpha = alpha(surface);
+    if let Some(facets) = surface.finish.anisotropy.facets(normal, alpha) {
+        return facets.lit_share(surface.view, towards);
+    }
+    let (cos_view, cos_light) = (normal.dot(surface.view), normal.dot(towards).abs());
     let a2 = alpha * alpha;
     let slope = |cos: f32| (a2 + (1.0 - a2) * cos * cos).sqrt();
     let (view, light) = (cos_light * slope(cos_view), cos_view * slope(cos_light));
@@ -199,11 +213,21 @@ fn lit_share(cos_view: f32, cos_light: f32, alpha: f32) -> f32 {
     (both / seen_share(cos_view, alpha)).min(1.0)
 }
 
+/// The facets of a surface about a normal.
+fn facets(surface: &Surface, normal: Vec3) -> Facets {
+    let alpha = alpha(surface);
+    let own = surface.finish.anisotropy.facets(normal, alpha);
+    own.unwrap_or_else(|| Facets::even(normal, alpha))
+}
+
 /// A facet's normal, drawn among those that the viewer sees.
-fn visible_facet(normal: Vec3, view: Vec3, alpha: f32, random: [f32; 2]) -> Vec3 {
-    let (tangent, bitangent) = normal.any_orthonormal_pair();
+fn visible_facet(facets: &Facets, view: Vec3, random: [f32; 2]) -> Vec3 {
+    let Facets {
+        axes: [tangent, bitangent, normal],
+        alphas,
+    } = *facets;
     let local = Vec3::new(view.dot(tangent), view.dot(bitangent), view.dot(normal));
-    let stretched = Vec3::new(local.x * alpha, local.y * alpha, local.z).normalize_or(Vec3::Z);
+    let stretched = Vec3::new(local.x * alphas.x, local.y * alphas.y, local.z).normalize_or(Vec3::Z);
     // A disk seen from the stretched view, the half of it that lies behind squeezed.
     let first = Vec2::new(-stretched.y, stretched.x)
         .normalize_or(Vec2::X)
@@ -215,6 +239,6 @@ fn visible_facet(normal: Vec3, view: Vec3, alpha: f32, random: [f32; 2]) -> Vec3
     y = (1.0 - squeeze) * (1.0 - x * x).max(0.0).sqrt() + squeeze * y;
     let z = (1.0 - x * x - y * y).max(0.0).sqrt();
     let facet = first * x + second * y + stretched * z;
-    let facet = Vec3::new(facet.x * alpha, facet.y * alpha, facet.z.max(1e-6)).normalize_or(Vec3::Z);
+    let facet = Vec3::new(facet.x * alphas.x, facet.y * alphas.y, facet.z.max(1e-6)).normalize_or(Vec3::Z);
     (tangent * facet.x + bitangent * facet.y + normal * facet.z).normalize_or(normal)
 }

@@ -5,6 +5,7 @@
 use glam::{Vec3, Vec4};
 use rayward_scene::{AlphaMode, Material, Scene, TextureRef};
 
+use super::finish::Finish;
 use super::surface::Lookup;
 use crate::casters::is_thin_glass;
 use crate::texture::{Encoding, Texture, Textures};
@@ -62,6 +63,8 @@ pub struct ShaderMaterial {
     pub specular_color_texture: Option<Texture>,
     /// Transmission in red.
     pub transmission_texture: Option<Texture>,
+    /// Film, sheen and anisotropy, if it has any.
+    pub(super) finish: Option<Box<Finish>>,
     /// What lies over it.
     pub coat: ShaderCoat,
 }
@@ -117,6 +120,7 @@ impl ShaderMaterial {
         let resolved = references(material)
             .map(|(reference, encoding)| reference.and_then(|r| textures.resolve(scene, &r, encoding)));
         let ratio = (material.ior - 1.0) / (material.ior + 1.0);
+        let finish = Finish::new(material, scene, textures).map(Box::new);
         Self {
             base_color: material.base_color,
             metallic: material.metallic,
@@ -134,7 +138,9 @@ impl ShaderMaterial {
             occlusion_strength: material.occlusion_strength,
             alpha_mode: material.alpha_mode,
             unlit: material.unlit,
-            textured: resolved.iter().any(Option::is_some),
+            textured: resolved.iter().any(Option::is_some)
+                || finish.as_ref().is_some_and(|finish| finish.is_textured()),
+            finish,
             base_color_texture: resolved[0],
             metallic_roughness_texture: resolved[1],
             normal_texture: resolved[2],
@@ -166,7 +172,13 @@ impl ShaderMaterial {
         let texel = |texture| lookup.get(texture).unwrap_or(Vec4::ONE);
         let metallic = (self.metallic * texel(&self.metallic_roughness_texture).z).clamp(0.0, 1.0);
         let through = self.transmission * texel(&self.transmission_texture).x;
-        through * (1.0 - metallic) * (1.0 - self.ior_reflectance * self.specular).max(0.0)
+        let bare = Vec3::splat(self.ior_reflectance * self.specular);
+        let film = self
+            .finish
+            .as_ref()
+            .map(|finish| finish.film(&|texture| lookup.get(texture)));
+        let reflected = film.map_or(bare, |film| film.over(bare, bare, 1.0));
+        through * (1.0 - metallic) * (1.0 - reflected.max_element()).max(0.0)
     }
 
     pub(super) fn coverage(&self, alpha: f32) -> f32 {
@@ -177,7 +189,12 @@ impl ShaderMaterial {
         }
     }
 
-    /// All its textures, in a fixed order: base colour, metallic and roughness, normal, occlusion, emission, weight and colour
+    /// Whether it has a film, sheen or anisotropy: what shades arrays is not asked for its surfaces.
+    pub fn has_finish(&self) -> bool {
+        self.finish.is_some()
+    }
+
+    /// All its textures but those of a film, sheen and anisotropy, in a fixed order: base colour, metallic and roughness, normal, occlusion, emission, weight and colour
     /// of the reflection, transmission, and the coat's share, roughness and normal.
     pub fn textures(&self) -> [Option<&Texture>; 11] {
         [

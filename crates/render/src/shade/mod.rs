@@ -14,6 +14,7 @@
 mod batch;
 pub mod brdf;
 mod coat;
+mod finish;
 mod light;
 pub mod lobes;
 mod material;
@@ -24,6 +25,7 @@ use rayward_trace::{AreaLight, Light};
 
 pub use batch::{Beam, CpuShading, ShadingBuilder, Source, SurfaceShader};
 pub use coat::Coat;
+pub use finish::{Anisotropy, Iridescence, Sheen, SurfaceFinish};
 pub use light::{Distribution, Incident, ShadingLight};
 pub use material::{ShaderCoat, ShaderMaterial};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
@@ -206,7 +208,10 @@ pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
             + share(traced.diffusion, back)
     };
     let coat = Vec3::splat(share(traced.coat, surface.coat.reflectance));
-    let around = surrounding * surface.base_color * (surface.occlusion * left);
+    let sheen = &surface.finish.sheen;
+    let fibres = sheen.reflectance * share(traced.diffusion, surface.occlusion);
+    let below = surface.occlusion * (left * sheen.passed);
+    let around = surrounding * surface.base_color * below + surrounding * fibres;
     (surface.emissive + around) * surface.coat.passed + surrounding * coat * surface.occlusion
 }
 
@@ -246,7 +251,8 @@ fn own_lobes_lit(surface: &Surface, towards: Vec3, drawn: f32, [reflected, diffu
 /// Whether [`lobes_lit`] may be anything.
 pub(crate) fn lobes_face(surface: &Surface, towards: Vec3) -> bool {
     let rough = |mirror: &Surface| !lobes::is_smooth(mirror);
-    let diffuse = surface.metallic < 1.0 && surface.transmission < 1.0;
+    let fibres = surface.finish.sheen.color != Vec3::ZERO;
+    let diffuse = fibres || (surface.metallic < 1.0 && surface.transmission < 1.0);
     let own = (diffuse || rough(surface)) && surface.normal.dot(towards) > 0.0;
     let of_coat = |coat: Surface| rough(&coat) && coat.normal.dot(towards) > 0.0;
     surface.geometric_normal.dot(towards) > 0.0 && (own || surface.coated().is_some_and(of_coat))

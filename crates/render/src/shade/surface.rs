@@ -14,6 +14,8 @@ use rayward_scene::{AlphaMode, FrameGeometry, Scene};
 use rayward_trace::solids::Crossing;
 
 use super::coat::Coat;
+use super::finish::{self, SurfaceFinish};
+use super::lobes::seen_normal;
 use super::material::{ShaderCoat, ShaderMaterial, references};
 use crate::texture::{Texture, Textures};
 
@@ -86,6 +88,8 @@ pub struct Surface {
     pub unlit: bool,
     /// Whether the viewer is on the front side of the triangle.
     pub front: bool,
+    /// Film, sheen and anisotropy.
+    pub finish: SurfaceFinish,
     /// What lies over all of that.
     pub coat: Coat,
 }
@@ -214,6 +218,15 @@ impl Lookup<'_> {
         &self.sets[usize::from(texture.uv_set.min(1))]
     }
 
+    /// A texture's coordinates of the corners, the first set's as they are without a texture.
+    #[inline]
+    fn corners(&self, texture: Option<&Texture>) -> [Vec2; 3] {
+        match texture {
+            Some(texture) => self.set(texture).corners.map(|uv| texture.transform(uv)),
+            None => self.sets[0].corners,
+        }
+    }
+
     /// The texel, or `None` without a texture.
     #[inline]
     pub(super) fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
@@ -229,7 +242,11 @@ impl<'s> Shader<'s> {
         let uses: Vec<_> = scene
             .materials
             .iter()
-            .flat_map(references)
+            .flat_map(|material| {
+                references(material)
+                    .into_iter()
+                    .chain(finish::references(material))
+            })
             .filter_map(|(reference, encoding)| Some((reference?, encoding)))
             .collect();
         let textures = Textures::new(scene, &uses);
@@ -326,10 +343,29 @@ impl<'s> Shader<'s> {
             let sides = [outward, geometric_normal];
             shading_normal(geometry, &corners, map, &lookup, edges, sides)
         };
+        let shading = normal((&material.normal_texture, material.normal_scale));
+        let finish = material.finish.as_ref().map(|finish| {
+            let cos = seen_normal([shading, geometric_normal], point.view).dot(point.view);
+            let texel = |texture: &Option<Texture>| lookup.get(texture);
+            finish.at(cos, texel, || {
+                let texture = finish
+                    .direction_texture
+                    .as_ref()
+                    .or(material.normal_texture.as_ref());
+                tangent_frame(
+                    geometry,
+                    &corners,
+                    texture,
+                    &lookup,
+                    edges,
+                    if front { shading } else { -shading },
+                )
+            })
+        });
         Surface {
             position: first + edges[0] * point.u + edges[1] * point.v,
             geometric_normal,
-            normal: normal((&material.normal_texture, material.normal_scale)),
+            normal: shading,
             view: point.view,
             base_color: base.xyz(),
             alpha: material.coverage(base.w),
@@ -345,6 +381,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0 + material.occlusion_strength * (occlusion - 1.0),
             unlit: material.unlit,
             front,
+            finish: finish.unwrap_or(SurfaceFinish::NONE),
             coat: coat(&material.coat, &lookup, [point.view, geometric_normal], normal),
         }
     }
@@ -370,6 +407,8 @@ impl<'s> Shader<'s> {
         let material = &self.materials[material as usize];
         let outward = crossing.normal.as_vec3();
         let normal = if crossing.enters { outward } else { -outward };
+        let finish = material.finish.as_ref();
+        let finish = finish.map(|finish| finish.at(normal.dot(view), |_| None, || None));
         Surface {
             position: position.as_vec3(),
             geometric_normal: normal,
@@ -389,6 +428,7 @@ impl<'s> Shader<'s> {
             occlusion: 1.0,
             unlit: material.unlit,
             front: crossing.enters,
+            finish: finish.unwrap_or(SurfaceFinish::NONE),
             coat: Coat::new(material.coat.factor, material.coat.roughness, [normal; 2], view),
         }
     }
@@ -477,12 +517,26 @@ fn shading_normal(
     let Some(texel) = lookup.get(map) else {
         return normal * side;
     };
-    let Some((tangent, handedness)) = tangent(geometry, corners, texture, lookup, edges, normal) else {
+    let uvs = || lookup.corners(Some(texture));
+    let Some((tangent, handedness)) = tangent(geometry, corners, uvs, edges, normal) else {
         return normal * side;
     };
     let bent = (texel.xyz() * 2.0 - Vec3::ONE) * Vec3::new(scale, scale, 1.0);
     let bitangent = normal.cross(tangent) * handedness;
     (tangent * bent.x + bitangent * bent.y + normal * bent.z).normalize_or(normal) * side
+}
+
+/// Tangent and bitangent about a normal, by a texture's coordinates where there are no tangents.
+fn tangent_frame(
+    geometry: &FrameGeometry,
+    corners: &Corners,
+    texture: Option<&Texture>,
+    lookup: &Lookup,
+    edges: [Vec3; 2],
+    normal: Vec3,
+) -> Option<[Vec3; 2]> {
+    let (along, handedness) = tangent(geometry, corners, || lookup.corners(texture), edges, normal)?;
+    Some([along, normal.cross(along) * handedness])
 }
 
 /// Unit tangent perpendicular to the normal, and the sign of the bitangent `normal x tangent`. glTF's texture
@@ -491,8 +545,7 @@ fn shading_normal(
 fn tangent(
     geometry: &FrameGeometry,
     corners: &Corners,
-    texture: &Texture,
-    lookup: &Lookup,
+    uvs: impl FnOnce() -> [Vec2; 3],
     edges: [Vec3; 2],
     normal: Vec3,
 ) -> Option<(Vec3, f32)> {
@@ -502,7 +555,7 @@ fn tangent(
     let (along, handedness) = match given {
         Some(tangents) => (corners.mix(tangents).xyz(), tangents[0].w.signum()),
         None => {
-            let uvs = lookup.set(texture).corners.map(|uv| texture.transform(uv));
+            let uvs = uvs();
             let (d1, d2) = (uvs[1] - uvs[0], uvs[2] - uvs[0]);
             // Scaled by the square of the determinant, which normalising removes; only its sign matters.
             let sign = d1.perp_dot(d2).signum();

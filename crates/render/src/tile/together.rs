@@ -9,7 +9,7 @@ use rayward_trace::{Tile, ViewRay};
 
 use super::{INVISIBLE, Seen, ShadedPoint, TileShader, TileWork};
 use crate::geometry::triangles;
-use crate::shade::{Beam, CpuShading, Source, SurfaceShader};
+use crate::shade::{Beam, CpuShading, Source, SurfaceFinish, SurfaceShader};
 use crate::{Sample, Surface, SurfacePoint, TileMut};
 use glam::Vec3;
 
@@ -41,20 +41,31 @@ impl TileShader<'_> {
         let Some(mut made) = shading.surfaces(points) else {
             return self.on_cpu().surfaces(points);
         };
-        if self.structures.transparent {
-            for (surface, point) in made.iter_mut().zip(points) {
-                if !self.shader.is_opaque(self.geometry, point.object) {
-                    surface.alpha = self.shader.coverage(self.geometry, point);
-                }
+        let materials = self.shader.materials();
+        for (surface, point) in made.iter_mut().zip(points) {
+            let material = self.geometry.objects[point.object as usize].material;
+            if materials[material as usize].has_finish() {
+                *surface = self.shader.surface(self.geometry, point);
+            } else if self.structures.transparent && !self.shader.is_opaque(self.geometry, point.object) {
+                surface.alpha = self.shader.coverage(self.geometry, point);
             }
         }
         made
     }
 
-    /// What surfaces send of the light of their beams.
+    /// What surfaces send of the light of their beams. That of films, sheen and anisotropy is the CPU's.
     pub(crate) fn lit(&self, shading: &dyn SurfaceShader, surfaces: &[Surface], beams: &[Beam]) -> Vec<Vec3> {
-        let lit = shading.lit(surfaces, beams);
-        lit.unwrap_or_else(|| self.on_cpu().lit(surfaces, beams))
+        let finished = |beam: &&Beam| surfaces[beam.surface as usize].finish != SurfaceFinish::NONE;
+        let plain: Vec<Beam> = beams.iter().filter(|beam| !finished(beam)).copied().collect();
+        let Some(mut lit) = shading.lit(surfaces, &plain) else {
+            return self.on_cpu().lit(surfaces, beams);
+        };
+        if plain.len() < beams.len() {
+            let others: Vec<Beam> = beams.iter().filter(finished).copied().collect();
+            let own = self.on_cpu().lit(surfaces, &others);
+            lit.iter_mut().zip(own).for_each(|(lit, own)| *lit += own);
+        }
+        lit
     }
 
     /// Notes the surfaces that these pixels see, as [`Self::see`] does.

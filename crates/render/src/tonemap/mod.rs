@@ -20,6 +20,7 @@ use crate::Film;
 
 /// How linear colour becomes displayable, each component in \[0, 1\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub enum ToneMap {
     /// Components are cut off at 1.
     #[default]

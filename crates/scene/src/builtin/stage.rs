@@ -4,8 +4,8 @@ use glam::{DMat3, DQuat, DVec3, Quat, Vec3, Vec4};
 
 use super::shapes::Surface;
 use crate::{
-    Animation, Camera, Channel, ChannelTarget, Interpolation, Light, LightKind, Material, Mesh, Node,
-    Primitive, Projection, Sampler, Scene, Shape, Solid, Transform,
+    Animation, Camera, Channel, ChannelTarget, DEFAULT_AMBIENT, Interpolation, Light, LightKind, Material,
+    Mesh, Node, Primitive, Projection, Sampler, Scene, Shape, Solid, Transform,
 };
 
 /// A scene under construction.
@@ -22,6 +22,7 @@ impl Stage {
                 name: name.into(),
                 materials: vec![Material::default()],
                 samplers: vec![Sampler::default()],
+                ambient: DEFAULT_AMBIENT,
                 ..Scene::default()
             },
         }

@@ -6,7 +6,10 @@ use glam::{DMat4, DVec3, DVec4};
 
 use super::base::Base;
 use super::read_file;
-use crate::{Error, LoadOptions, Material, Mesh, Node, Notice, Primitive, Sampler, Scene, Transform, UpAxis};
+use crate::{
+    DEFAULT_AMBIENT, Error, LoadOptions, Material, Mesh, Node, Notice, Primitive, Sampler, Scene, Transform,
+    UpAxis,
+};
 
 /// The file that is being read, for reading it and for naming it in errors.
 #[derive(Clone, Copy)]
@@ -58,6 +61,7 @@ impl Source<'_> {
             }],
             materials: vec![default_material()],
             samplers: vec![Sampler::default()],
+            ambient: DEFAULT_AMBIENT,
             name: stem,
             ..Scene::default()
         }

@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 
 use super::frame::{CubeFrame, Raster, TILE};
-use super::levels::{Cell, Hierarchy, Level, slots};
+use super::levels::{Cell, Hierarchy, Level, Texel, coarse_slots, slots};
 use super::raster::{Coverage, Fragment, Routed};
 use super::samples::{Depth, DepthFormat, Sample, Samples};
 use super::{LdcBuild, LdcOptions};
@@ -23,8 +23,8 @@ pub(crate) struct Stack {
     pub(crate) raster: Raster,
     /// Size of the cube along the direction, in texels.
     pub(crate) scale: f32,
-    /// Start of each texel's samples, in memory order, and their end.
-    pub(crate) starts: Vec<u32>,
+    /// Each texel, in memory order, and the end of the last one's samples.
+    pub(crate) texels: Vec<Texel>,
     pub(crate) samples: Samples,
     /// Coarsest first.
     pub(crate) levels: Vec<Level>,
@@ -173,23 +173,29 @@ fn stack<D: Depth>(
         })
         .collect();
     let total = bands.iter().map(|b| b.samples.len()).sum();
-    let (mut starts, mut samples) = (Vec::with_capacity(raster.texels() + 1), Vec::with_capacity(total));
+    let (mut texels, mut samples) = (Vec::with_capacity(raster.texels() + 1), Vec::with_capacity(total));
     let mut base = options.hierarchy.base().map(|shift| Level::empty(&raster, shift));
     let mut layers = 0;
     for (index, band) in bands.iter().enumerate() {
         let offset = samples.len() as u32;
-        starts.extend(band.starts[..band.starts.len() - 1].iter().map(|s| s + offset));
+        texels.extend(band.starts.windows(2).map(|range| Texel {
+            start: range[0] + offset,
+            occupied: band.occupied(range, options.hierarchy, scale, D::error(scale)),
+        }));
         samples.extend(band.samples.iter().map(|(prim, f)| Sample::of(f, *prim, scale)));
         layers = band.starts.windows(2).map(|w| w[1] - w[0]).fold(layers, u32::max);
         if let Some(level) = &mut base {
             band.bound(level, index as u32, options.hierarchy, scale, D::error(scale));
         }
     }
-    starts.push(samples.len() as u32);
+    texels.push(Texel {
+        start: samples.len() as u32,
+        occupied: 0,
+    });
     Stack {
         raster,
         scale,
-        starts,
+        texels,
         samples: wrap(samples),
         levels: options.hierarchy.complete(&raster, base),
         layers,
@@ -301,6 +307,18 @@ impl Band {
             starts,
             samples: lists.into_iter().flatten().collect(),
         }
+    }
+
+    /// The 32nds of the depth that samples of a texel lie in.
+    fn occupied(&self, range: &[u32], hierarchy: Hierarchy, scale: f32, error: f32) -> u32 {
+        if !hierarchy.occupancy() {
+            return u32::MAX;
+        }
+        let samples = &self.samples[range[0] as usize..range[1] as usize];
+        samples.iter().fold(0, |occupied, (_, fragment)| {
+            let [low, high] = [fragment.range[0] - error, fragment.range[1] + error];
+            occupied | coarse_slots(low, high, 32.0 / scale)
+        })
     }
 
     /// Adds the samples to the lowest level's cells.

@@ -53,6 +53,21 @@ pub(crate) fn slots(min: f32, max: f32, per_texel: f32) -> u64 {
     (u64::MAX << low.min(63)) & (u64::MAX >> (63 - high))
 }
 
+/// Where a texel's samples begin, and the 32nds of the depth that hold any, so that most texels that a ray passes beside
+/// what is in them cost no look at their samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Texel {
+    pub(crate) start: u32,
+    pub(crate) occupied: u32,
+}
+
+/// Bits of the 32nds between two depths; `per_texel` is 32 over the cube's size.
+#[inline(always)]
+pub(crate) fn coarse_slots(min: f32, max: f32, per_texel: f32) -> u32 {
+    let (low, high) = ((min * per_texel) as u32, ((max * per_texel) as u32).min(31));
+    (u32::MAX << low.min(31)) & (u32::MAX >> (31 - high))
+}
+
 /// One level of cells.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Level {

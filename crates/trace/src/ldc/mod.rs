@@ -16,7 +16,7 @@
 //! A frame of an animation may have two of them, one of what has stood still so far and is kept ([`StillCube`]), one of
 //! what moves; a ray is followed through the one it enters first, and what it meets there shortens it for the other.
 //!
-//! Layout: 4 bytes a texel, 8 or 12 bytes a sample (`ldc/samples.rs`), 16 bytes a cell (`ldc/levels.rs`); texels in
+//! Layout: 8 bytes a texel, 8 or 12 bytes a sample (`ldc/samples.rs`), 16 bytes a cell (`ldc/levels.rs`); texels in
 //! tiles of 8 x 8. Limits: rays that start more than 2^36 texels away test every triangle; triangles much larger than
 //! the scene's rest leave all of that in few texels, which stays right but slow.
 
@@ -52,7 +52,7 @@ use build::Stack;
 use frame::widened;
 use raster::{NO_PLANE, REACH};
 use samples::{Depth, Sample, Samples};
-use walk::walk;
+use walk::{Reach, walk};
 
 /// How samples are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -156,7 +156,7 @@ impl Cube {
     fn bytes(&self) -> usize {
         let stack = |s: &Stack| {
             let cells: usize = s.levels.iter().map(|l| size_of_val(&*l.cells)).sum();
-            size_of_val(&*s.starts) + s.samples.bytes() + cells
+            size_of_val(&*s.texels) + s.samples.bytes() + cells
         };
         size_of_val(&*self.prims) + self.stacks.iter().map(stack).sum::<usize>()
     }
@@ -392,6 +392,10 @@ impl<'a> Ldc<'a> {
 /// 1/254 over half a texel either way, and samples reach a little beyond their texels.
 const PLANE_SLACK: f32 = 1.0 / 127.0 + 4.0 * REACH as f32;
 
+/// How far a sample's plane departs from its depth over the texel: slopes are at most 1 either way. A sample without a
+/// plane stands for as much.
+pub(crate) const PLANE_REACH: f32 = 1.0 + 1.0 / 64.0;
+
 /// Calls `visit` with the triangles whose planes the ray crosses in the texels of one direction. Returns whether it
 /// broke off.
 #[inline(always)]
@@ -406,23 +410,36 @@ fn crossed<D: Depth>(
     let slack = PLANE_SLACK + D::error(stack.scale);
     let mut tests = 0;
     let mut broken = false;
-    walk(stack, ray, t_end, 0.0, steps, |[from, to], segment, t_end| {
-        for sample in &samples[from..to] {
-            let needle = sample.slopes == NO_PLANE;
-            let slopes = if needle { [0; 2] } else { sample.slopes };
-            let [a, b] = segment.above(sample.depth.texels(stack.scale), slopes);
-            let slack = if needle { slack + 1.0 } else { slack };
-            if a.min(b) > slack || a.max(b) < -slack {
-                continue;
+    let reach = Reach {
+        cell: 0.0,
+        texel: 0.0,
+        sample: slack + PLANE_REACH,
+    };
+    walk(
+        stack,
+        samples,
+        ray,
+        t_end,
+        reach,
+        steps,
+        |near, segment, t_end| {
+            for sample in near {
+                let needle = sample.slopes == NO_PLANE;
+                let slopes = if needle { [0; 2] } else { sample.slopes };
+                let [a, b] = segment.above(sample.depth.texels(stack.scale), slopes);
+                let slack = if needle { slack + 1.0 } else { slack };
+                if a.min(b) > slack || a.max(b) < -slack {
+                    continue;
+                }
+                tests += 1;
+                if visit(sample.prim, t_end).is_break() {
+                    broken = true;
+                    return ControlFlow::Break(());
+                }
             }
-            tests += 1;
-            if visit(sample.prim, t_end).is_break() {
-                broken = true;
-                return ControlFlow::Break(());
-            }
-        }
-        ControlFlow::Continue(())
-    });
+            ControlFlow::Continue(())
+        },
+    );
     for _ in 0..tests {
         steps.triangle();
     }

@@ -17,8 +17,8 @@ use super::build::Stack;
 use super::frame::{Clipped, TexelRay};
 use super::raster::NO_PLANE;
 use super::samples::{Depth, Sample, Samples};
-use super::walk::{Segment, Steps, walk};
-use super::{Cube, Ldc, axis_order};
+use super::walk::{Reach, Segment, Steps, walk};
+use super::{Cube, Ldc, PLANE_REACH, axis_order};
 use crate::exact;
 use crate::{Hit, Ray};
 
@@ -49,12 +49,23 @@ impl HitTest {
         0.001 * resolution as f32
     }
 
-    /// How far from its depth a sample may be hit.
-    fn pad(self) -> f32 {
+    /// How far from its depth a sample may be hit. `steepness`: change of the ray's depth over a texel across.
+    fn reach(self, steepness: f32) -> Reach {
         match self {
-            Self::Strict { tolerance } | Self::Interval { tolerance } => tolerance,
-            // Its slopes are at most 1 either way.
-            Self::Plane { margin } => 2.0 * margin,
+            Self::Strict { tolerance } | Self::Interval { tolerance } => Reach {
+                cell: tolerance,
+                texel: tolerance,
+                sample: tolerance + 1.0 / 64.0,
+            },
+            // Its slopes are at most 1 either way, and beyond the texel the ray has other depths.
+            Self::Plane { margin } => {
+                let beyond = margin * (2.0 + 1.01 * steepness);
+                Reach {
+                    cell: 2.0 * margin,
+                    texel: beyond,
+                    sample: PLANE_REACH + beyond,
+                }
+            }
         }
     }
 
@@ -203,14 +214,16 @@ fn in_stack<D: Depth>(
     // Parameter per texel across the raster.
     let lateral = 1.0 / across.x.hypot(across.y);
     let mut best: Option<(f64, u32)> = None;
+    let steepness = (across.z.abs() * lateral) as f32;
     walk(
         stack,
+        samples,
         ray,
         t_end,
-        test.pad(),
+        test.reach(steepness),
         steps,
-        |[from, to], segment, t_end| {
-            for sample in &samples[from..to] {
+        |near, segment, t_end| {
+            for sample in near {
                 let slopes = if sample.slopes == NO_PLANE {
                     [0; 2]
                 } else {

@@ -104,9 +104,9 @@ pub struct TexelSample {
 /// The samples of a direction with their texels.
 pub(crate) fn listed<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<TexelSample> {
     let mut all = Vec::with_capacity(samples.len());
-    for (texel, range) in stack.starts.windows(2).enumerate() {
+    for (texel, range) in stack.texels.windows(2).enumerate() {
         all.extend(
-            samples[range[0] as usize..range[1] as usize]
+            samples[range[0].start as usize..range[1].start as usize]
                 .iter()
                 .map(|sample| TexelSample {
                     texel: texel as u32,

@@ -26,7 +26,7 @@ fn listed(stack: &Stack) -> Vec<(u32, f32, usize)> {
     fn list<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<(u32, f32, usize)> {
         (0..stack.raster.texels())
             .flat_map(|texel| {
-                let range = stack.starts[texel] as usize..stack.starts[texel + 1] as usize;
+                let range = stack.texels[texel].start as usize..stack.texels[texel + 1].start as usize;
                 samples[range]
                     .iter()
                     .map(move |s| (s.prim, s.depth.texels(stack.scale), texel))

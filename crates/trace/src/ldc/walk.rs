@@ -10,11 +10,10 @@
 
 use std::ops::ControlFlow;
 
-use glam::DVec3;
-
 use super::build::Stack;
 use super::frame::TexelRay;
-use super::levels::{Level, slots};
+use super::levels::{Cell, Texel, coarse_slots, slots};
+use super::samples::{Depth, Sample};
 
 /// Receives the steps of a traversal. The implementation for `()` does nothing and compiles to nothing.
 pub trait Steps {
@@ -86,111 +85,161 @@ impl Segment {
     /// How far a plane's depth lies below the ray at both ends.
     #[inline(always)]
     pub(crate) fn above(&self, depth: f32, slopes: [i8; 2]) -> [f32; 2] {
-        let [gu, gv] = slopes.map(|g| f32::from(g) * (1.0 / 127.0));
-        [0, 1].map(|i| self.w[i] - (depth + gu * self.u[i] + gv * self.v[i]))
+        let slope = |g: i8| f32::from(g) * (1.0 / 127.0);
+        let (gu, gv) = (slope(slopes[0]), slope(slopes[1]));
+        let above = |i: usize| self.w[i] - (depth + gu * self.u[i] + gv * self.v[i]);
+        [above(0), above(1)]
     }
 }
 
-/// A ray in one direction's raster.
-struct Walk {
-    origin: DVec3,
-    dir: DVec3,
-    inverse: [f64; 2],
-    size: [i32; 2],
+/// A ray along one axis of a raster.
+struct Across {
+    origin: f64,
+    dir: f64,
+    inverse: f64,
+    /// Added to parameters: infinity where the ray never leaves.
+    never: f64,
+    forward: bool,
+    size: i32,
 }
 
-impl Walk {
-    /// Parameter at which the ray passes coordinate `edge` of a raster axis.
-    #[inline(always)]
-    fn at_edge(&self, axis: usize, edge: i32) -> f64 {
-        (f64::from(edge) - self.origin[axis]) * self.inverse[axis]
+impl Across {
+    fn new(origin: f64, dir: f64, size: u32) -> Self {
+        let still = dir == 0.0;
+        Self {
+            origin,
+            dir,
+            inverse: if still { 0.0 } else { 1.0 / dir },
+            never: if still { f64::INFINITY } else { 0.0 },
+            forward: dir > 0.0,
+            size: size as i32,
+        }
     }
 
     #[inline(always)]
-    fn depth(&self, t: f64) -> f64 {
-        self.origin.z + t * self.dir.z
+    fn at(&self, t: f64) -> f64 {
+        self.origin + t * self.dir
     }
 
-    /// Texel of the ray's point on a raster axis, between two.
+    /// Texel of the ray's point, between two.
     #[inline(always)]
-    fn texel(&self, axis: usize, t: f64, first: i32, last: i32) -> i32 {
-        // Casts cut off and saturate.
-        ((self.origin[axis] + t * self.dir[axis]) as i32).clamp(first, last)
+    fn texel(&self, t: f64, first: i32, end: i32) -> i32 {
+        // Casts cut off and saturate; a cell at the raster's end may reach beyond it.
+        (self.at(t) as i32).max(first).min(end.min(self.size) - 1)
     }
 
-    /// Whether the ray's depths between two parameters meet what a cell holds.
+    /// Parameter at which the ray leaves the texels from `first` to before `end`.
     #[inline(always)]
-    fn meets(&self, level: &Level, at: [i32; 2], t: [f64; 2], pad: f32, per_texel: f32) -> bool {
-        let cell = level.cell(at[0] as u32, at[1] as u32);
-        let [a, b] = t.map(|t| self.depth(t) as f32);
-        let (low, high) = (a.min(b) - pad, a.max(b) + pad);
-        low <= cell.max && high >= cell.min && slots(low, high, per_texel) & cell.occupied != 0
+    fn exit(&self, first: i32, end: i32) -> f64 {
+        let edge = if self.forward { end } else { first };
+        (f64::from(edge) - self.origin) * self.inverse + self.never
+    }
+
+    /// The texel it goes to from there, if it is in the raster.
+    #[inline(always)]
+    fn next(&self, first: i32, end: i32) -> Option<i32> {
+        let next = if self.forward { end } else { first - 1 };
+        (0..self.size).contains(&next).then_some(next)
     }
 }
 
-/// Calls `visit` with the samples (as a range of the stack's) of every texel the ray passes over, in order along the
-/// ray, until it breaks. `visit` may shorten the ray through its last argument. Cells count as met when the ray
-/// comes within `pad` texels of their depths.
+/// Whether depths meet what a cell holds.
 #[inline(always)]
-pub(crate) fn walk(
+fn meets(cell: &Cell, [a, b]: [f32; 2], reach: f32, per_texel: f32) -> bool {
+    let (low, high) = (a.min(b) - reach, a.max(b) + reach);
+    low <= cell.max && high >= cell.min && slots(low, high, per_texel) & cell.occupied != 0
+}
+
+/// Whether depths pass where a texel has samples.
+#[inline(always)]
+fn occupied(texel: &Texel, [a, b]: [f32; 2], reach: f32, per_texel: f32) -> bool {
+    let passed = coarse_slots(a.min(b) - reach, a.max(b) + reach, per_texel);
+    passed & texel.occupied != 0
+}
+
+/// Those of a texel's samples that may lie within reach of the ray's depths.
+#[inline(always)]
+fn within<D: Depth>(list: &[Sample<D>], [a, b]: [f32; 2], reach: f32, scale: f32) -> &[Sample<D>] {
+    let (low, high) = (a.min(b) - reach, a.max(b) + reach);
+    let from = list.partition_point(|sample| sample.depth.texels(scale) < low);
+    let list = &list[from..];
+    // These are few.
+    let beyond = list.iter().position(|sample| sample.depth.texels(scale) > high);
+    &list[..beyond.unwrap_or(list.len())]
+}
+
+/// How far from the ray something may be that counts, in texels of depth.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Reach {
+    /// Bounds of a cell.
+    pub(crate) cell: f32,
+    /// What a texel's samples span.
+    pub(crate) texel: f32,
+    /// Depth of a sample at its texel's centre, from what the ray has over the texel.
+    pub(crate) sample: f32,
+}
+
+/// Calls `visit` with the samples within reach in every texel the ray passes over, texels in order along the ray, until
+/// it breaks. `visit` may shorten the ray through its last argument.
+///
+/// Samples of a texel are sorted by depth, so those within reach are found by halving: a texel of a wall seen along its
+/// length has hundreds.
+#[inline(always)]
+pub(crate) fn walk<D: Depth>(
     stack: &Stack,
+    samples: &[Sample<D>],
     ray: &TexelRay,
     t_end: &mut f64,
-    pad: f32,
+    reach: Reach,
     steps: &mut impl Steps,
-    mut visit: impl FnMut([usize; 2], &Segment, &mut f64) -> ControlFlow<()>,
+    mut visit: impl FnMut(&[Sample<D>], &Segment, &mut f64) -> ControlFlow<()>,
 ) {
     let raster = stack.raster;
     let (origin, dir) = (raster.turned(ray.origin), raster.turned(ray.dir));
-    let walk = Walk {
-        origin,
-        dir,
-        inverse: [1.0 / dir.x, 1.0 / dir.y],
-        size: raster.size.map(|s| s as i32),
-    };
+    let x = Across::new(origin.x, dir.x, raster.size[0]);
+    let y = Across::new(origin.y, dir.y, raster.size[1]);
+    let depth_at = |t: f64| (origin.z + t * dir.z) as f32;
     let levels = &stack.levels[..];
     let per_texel = 64.0 / stack.scale;
     let mut t = ray.t_min;
-    let mut at = [0, 1].map(|i| walk.texel(i, t, 0, walk.size[i] - 1));
+    let (mut column, mut row) = (x.texel(t, 0, x.size), y.texel(t, 0, y.size));
     let mut depth = 0;
     while t <= *t_end {
-        let shift = levels.get(depth).map_or([0; 2], |level| level.shift);
-        let low = [0, 1].map(|i| at[i] >> shift[i] << shift[i]);
-        let high = [0, 1].map(|i| low[i] + (1 << shift[i]));
-        let exits = [0, 1].map(|i| {
-            if dir[i] > 0.0 {
-                walk.at_edge(i, high[i])
-            } else if dir[i] < 0.0 {
-                walk.at_edge(i, low[i])
-            } else {
-                f64::INFINITY
-            }
-        });
-        let side = usize::from(exits[1] < exits[0]);
+        let level = levels.get(depth);
+        let [sx, sy] = level.map_or([0; 2], |level| level.shift);
+        let (left, top) = (column >> sx << sx, row >> sy << sy);
+        let (right, bottom) = (left + (1 << sx), top + (1 << sy));
+        let (exit_x, exit_y) = (x.exit(left, right), y.exit(top, bottom));
+        let sideways = exit_y < exit_x;
         // Rounding must not turn a segment around.
-        let exit = exits[side].max(t);
+        let exit = if sideways { exit_y } else { exit_x }.max(t);
         let end = exit.min(*t_end);
-        if let Some(level) = levels.get(depth) {
+        let w = [depth_at(t), depth_at(end)];
+        if let Some(level) = level {
             steps.cell();
-            if walk.meets(level, at, [t, end], pad, per_texel) {
+            if meets(level.cell(column as u32, row as u32), w, reach.cell, per_texel) {
                 depth += 1;
                 continue;
             }
         } else {
             steps.texel();
-            let index = raster.index(at[0] as u32, at[1] as u32);
-            let range = [stack.starts[index] as usize, stack.starts[index + 1] as usize];
-            if range[0] < range[1] {
-                steps.samples(range[1] - range[0]);
-                let ends = [t, end];
-                let centre = at.map(|i| f64::from(i) + 0.5);
+            let index = raster.index(column as u32, row as u32);
+            let near = if occupied(&stack.texels[index], w, reach.texel, 0.5 * per_texel) {
+                let list = stack.texels[index].start as usize..stack.texels[index + 1].start as usize;
+                within(&samples[list], w, reach.sample, stack.scale)
+            } else {
+                &[]
+            };
+            if !near.is_empty() {
+                steps.samples(near.len());
+                let (u, v) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
                 let segment = Segment {
-                    t: ends,
-                    u: ends.map(|t| (origin.x + t * dir.x - centre[0]) as f32),
-                    v: ends.map(|t| (origin.y + t * dir.y - centre[1]) as f32),
-                    w: ends.map(|t| walk.depth(t) as f32),
+                    t: [t, end],
+                    u: [(x.at(t) - u) as f32, (x.at(end) - u) as f32],
+                    v: [(y.at(t) - v) as f32, (y.at(end) - v) as f32],
+                    w,
                 };
-                if visit(range, &segment, t_end).is_break() {
+                if visit(near, &segment, t_end).is_break() {
                     return;
                 }
             }
@@ -198,26 +247,18 @@ pub(crate) fn walk(
         if exit > *t_end {
             return;
         }
-        let other = 1 - side;
-        let from = at;
-        at[side] = if dir[side] > 0.0 {
-            high[side]
+        let from = (column, row);
+        let next = if sideways {
+            y.next(top, bottom).map(|next| (x.texel(exit, left, right), next))
         } else {
-            low[side] - 1
+            x.next(left, right).map(|next| (next, y.texel(exit, top, bottom)))
         };
-        at[other] = walk.texel(other, exit, low[other], high[other] - 1);
-        if at[side] < 0 || at[side] >= walk.size[side] {
-            return;
-        }
-        // A cell at the raster's end may reach beyond it.
-        at[other] = at[other].min(walk.size[other] - 1);
+        let Some(to) = next else { return };
+        (column, row) = to;
         t = exit;
         if depth > 0 {
-            let above = levels[depth - 1].shift;
-            let left = [0, 1]
-                .into_iter()
-                .any(|i| from[i] >> above[i] != at[i] >> above[i]);
-            depth -= usize::from(left);
+            let [sx, sy] = levels[depth - 1].shift;
+            depth -= usize::from((from.0 ^ column) >> sx != 0 || (from.1 ^ row) >> sy != 0);
         }
     }
 }

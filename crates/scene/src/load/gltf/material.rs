@@ -5,6 +5,8 @@
 //! (above 1 for metals), roughness is 1 - glossiness, and the glossiness in a texture's alpha becomes a
 //! roughness image of its own.
 
+mod layers;
+
 use std::collections::HashMap;
 
 use glam::{Vec2, Vec3, Vec4};
@@ -12,12 +14,11 @@ use gltf::json;
 use gltf::json::extensions::texture::TextureTransform as FileTransform;
 use gltf::json::material::AlphaMode as FileAlphaMode;
 use gltf::json::texture::{Info, MagFilter, MinFilter, WrappingMode};
-use serde::Deserialize;
 
 use super::image::{Derivation, Wanted};
 use super::source::Source;
 use super::{Notices, place};
-use crate::{AlphaMode, Coat, Error, LoadOptions, Material, Sampler, TextureRef, TextureTransform, Wrap};
+use crate::{AlphaMode, Error, LoadOptions, Material, Sampler, TextureRef, TextureTransform, Wrap};
 
 /// Reflectance at normal incidence for an index of refraction of 1.5.
 const DIELECTRIC_F0: f32 = 0.04;
@@ -156,44 +157,9 @@ fn extend(
     if let Some(glossy) = &extensions.pbr_specular_glossiness {
         specular_glossiness(out, glossy, textures, place)?;
     }
-    if let Some(value) = extensions.others.get("KHR_materials_clearcoat") {
-        out.coat = coat(value, textures, place)?;
-    }
+    layers::extend(out, &extensions.others, textures, place)?;
     out.unlit = extensions.unlit.is_some();
     Ok(())
-}
-
-/// `KHR_materials_clearcoat`, of which the `gltf` crate has no model.
-#[derive(Default, Deserialize)]
-#[serde(rename_all = "camelCase", default)]
-struct FileCoat {
-    clearcoat_factor: f32,
-    clearcoat_texture: Option<Info>,
-    clearcoat_roughness_factor: f32,
-    clearcoat_roughness_texture: Option<Info>,
-    clearcoat_normal_texture: Option<json::material::NormalTexture>,
-}
-
-fn coat(value: &json::Value, textures: &mut Textures<'_>, place: &str) -> Result<Coat, Error> {
-    let file = FileCoat::deserialize(value).map_err(|e| {
-        let problem = format!("KHR_materials_clearcoat: {e}");
-        textures.source.malformed(place, problem)
-    })?;
-    let mut out = Coat {
-        factor: file.clearcoat_factor.clamp(0.0, 1.0),
-        texture: textures.info(file.clearcoat_texture.as_ref(), place, "clearcoatTexture")?,
-        roughness: file.clearcoat_roughness_factor.clamp(0.0, 1.0),
-        roughness_texture: textures.info(
-            file.clearcoat_roughness_texture.as_ref(),
-            place,
-            "clearcoatRoughnessTexture",
-        )?,
-        ..Coat::default()
-    };
-    if let Some(normal) = &file.clearcoat_normal_texture {
-        (out.normal_texture, out.normal_scale) = textures.normal(normal, place, "clearcoatNormalTexture")?;
-    }
-    Ok(out)
 }
 
 fn specular_glossiness(

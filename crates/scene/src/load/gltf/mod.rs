@@ -32,8 +32,10 @@ mod source;
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use self::source::Source;
-use crate::{Error, LoadOptions, Notice, Scene};
+use crate::{DEFAULT_AMBIENT, Error, LoadOptions, Notice, Scene};
 
 /// Most vertices, and most triangles, of a scene with all its instances.
 const MAX_VERTICES: usize = 1 << 27;
@@ -73,6 +75,11 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene, Error> {
             .unwrap_or_default(),
         cameras: lens::cameras(&source, options)?,
         lights: lens::lights(&source, options, &mut notices)?,
+        ambient: if tree.nodes.iter().any(|node| node.light.is_some()) {
+            Vec3::ZERO
+        } else {
+            DEFAULT_AMBIENT
+        },
         images: image::decode(&source, &materials.images)?,
         materials: materials.materials,
         samplers: materials.samplers,
