@@ -70,6 +70,10 @@ fn varied(name: &str, veils: bool) -> Scene {
         transform: TextureTransform::default(),
     };
     for (i, material) in scene.materials.iter_mut().enumerate() {
+        if i % 3 == 1 {
+            material.sheen.color = Vec3::new(0.7, 0.5, 0.3);
+            material.sheen.roughness = 0.4;
+        }
         material.base_color_texture = material.base_color_texture.or(Some(texture(i)));
         match i % 6 {
             0 => (material.metallic, material.roughness) = (1.0, 0.0),

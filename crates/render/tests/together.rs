@@ -65,6 +65,10 @@ impl ShadingBuilder for Cpu<'static> {
 fn varied(name: &str) -> Scene {
     let mut scene = builtin::build(name).expect("a built-in scene");
     for (i, material) in scene.materials.iter_mut().enumerate() {
+        if i % 3 == 1 {
+            material.sheen.color = Vec3::new(0.7, 0.5, 0.3);
+            material.sheen.roughness = 0.4;
+        }
         match i % 5 {
             0 => (material.metallic, material.roughness) = (1.0, 0.0),
             1 => {
