@@ -102,12 +102,16 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         files,
     )
     .with_device(&device);
-    if args.run.json {
-        report::to_stdout_json(&summary)
-    } else {
-        report::note(&summary.text());
-        Ok(())
+    tell(&summary, args.run.json)
+}
+
+/// Tells what a picture was made of and what it cost.
+fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
+    if json {
+        return report::to_stdout_json(summary);
     }
+    report::note(&summary.text());
+    Ok(())
 }
 
 /// Where the picture, or the part of it, goes.
