@@ -11,8 +11,8 @@ use rayward::scene::builtin;
 
 use crate::bench::BenchArgs;
 use crate::values::{
-    self, Antialiasing, Casters, Exposure, Filter, GpuUse, LayerName, LightValue, Operator, SecondaryUse,
-    Shadows, Shown, Size, Span, Up,
+    self, Antialiasing, Casters, Exposure, Filter, GpuShadingUse, GpuUse, LayerName, LightValue, Operator,
+    SecondaryUse, Shadows, Shown, Size, Span, Up,
 };
 
 const HELP: &str = "\
@@ -428,11 +428,14 @@ pub(crate) struct RunArgs {
     /// Instruction set: one that `rayward doctor` lists; the best unless given. The picture does not depend on it
     #[arg(long, value_name = "LEVEL")]
     pub(crate) simd: Option<String>,
-    /// Eye rays, shadows, reflections and refractions on a GPU; auto takes the CPU where there is none but software. The
-    /// picture does not depend on it
+    /// Frames on a GPU: eye rays, shadows, reflections and refractions, exact as on the CPU, and shading, up to rounding; auto
+    /// takes the CPU where there is none but software
     #[arg(long, value_name = "on|auto|off", default_value = "off", default_missing_value = "on", num_args = 0..=1,
         require_equals = true, conflicts_with_all = ["aperture", "shutter", "reference", "secondary"])]
     pub(crate) gpu: GpuUse,
+    /// What shades frames with --gpu; with cpu the picture has the bits of one without --gpu
+    #[arg(long, value_name = "WHAT", default_value = "device", requires = "gpu")]
+    pub(crate) gpu_shading: GpuShadingUse,
     /// What answers reflections and refractions on the CPU. The picture does not depend on it
     #[arg(long, value_name = "STRUCTURE", default_value = "hierarchy",
         conflicts_with_all = ["aperture", "shutter", "reference"])]

@@ -6,16 +6,40 @@ use glam::Vec3;
 use rayward::scene::builtin;
 use rayward::trace::{Accel, Bvh, Ray};
 use rayward::{CubeBuilder, Renderer, triangles};
-use rayward_gpu::{AdapterSummary, Cube, CubeOptions, Gpu, GpuSecondary, adapters};
+use rayward_gpu::{AdapterSummary, Cube, CubeOptions, Error, Gpu, GpuSecondary, GpuShading, adapters};
 use serde::Serialize;
 
 use crate::args::RunArgs;
 use crate::failure::{Code, Failure};
 use crate::report::{self, thousands};
-use crate::values::{GpuUse, SecondaryUse};
+use crate::values::{GpuShadingUse, GpuUse, SecondaryUse};
 
 /// The device that frames are made with, if they are.
-pub(crate) struct Device(Option<Arc<GpuSecondary>>, GpuUse);
+pub(crate) struct Device {
+    tracing: Option<Arc<GpuSecondary>>,
+    shading: Option<Arc<GpuShading>>,
+    /// Why the CPU shades though the device was to.
+    not_shading: Option<String>,
+    asked: GpuUse,
+}
+
+/// What a device has done so far; its fields are those of the JSON object.
+#[derive(Serialize)]
+pub(crate) struct DeviceSummary {
+    adapter: String,
+    /// Rays traced on it.
+    rays: usize,
+    /// Those of them that f32 could not tell, answered on the CPU.
+    unsure_rays: usize,
+    /// `device` or `cpu`.
+    shading: &'static str,
+    /// Why it is the CPU though the device was to.
+    shading_problem: Option<String>,
+    /// Surfaces made on it.
+    surfaces: u64,
+    /// Beams of light added up on it.
+    beams: u64,
+}
 
 impl Device {
     /// Opens what was asked for and has the renderer use it.
@@ -23,15 +47,24 @@ impl Device {
         if args.secondary == SecondaryUse::Cube {
             renderer.set_secondary(Arc::new(CubeBuilder::default()));
         }
-        let none = Self(None, args.gpu);
+        let mut opened = Self {
+            tracing: None,
+            shading: None,
+            not_shading: None,
+            asked: args.gpu,
+        };
         if args.gpu == GpuUse::Off {
-            return Ok(none);
+            return Ok(opened);
         }
         let problem = match Gpu::open(None) {
             Ok(gpu) if args.gpu == GpuUse::On || !gpu.adapter().software => {
                 let device = Arc::new(GpuSecondary::new(gpu, CubeOptions::default()));
                 renderer.set_secondary(Arc::clone(&device) as Arc<_>);
-                return Ok(Self(Some(device), args.gpu));
+                if args.gpu_shading == GpuShadingUse::Device {
+                    opened.shade(&device, renderer);
+                }
+                opened.tracing = Some(device);
+                return Ok(opened);
             }
             Ok(gpu) => format!("{} is software", gpu.adapter().name),
             Err(problem) => problem.to_string(),
@@ -42,33 +75,88 @@ impl Device {
         if !args.quiet {
             report::note(&format!("on the CPU: {}", report::clean(&problem)));
         }
-        Ok(none)
+        Ok(opened)
     }
 
-    /// Tells what it has done. An error of a device that was to be used is ours, too.
+    /// Has frames shaded there, if the scene fits.
+    fn shade(&mut self, device: &Arc<GpuSecondary>, renderer: &mut Renderer) {
+        match GpuShading::new(device, renderer.shader()) {
+            Ok(shading) => {
+                let shading = Arc::new(shading);
+                renderer.set_shading(Some(Arc::clone(&shading) as Arc<_>));
+                self.shading = Some(shading);
+            }
+            Err(problem) => self.not_shading = Some(problem.to_string()),
+        }
+    }
+
+    /// Why the CPU shades, or has shaded in part, though the device was to.
+    fn shading_problem(&self) -> Option<String> {
+        let failed = self.shading.as_ref().and_then(|shading| shading.problem());
+        failed
+            .map(|problem| problem.to_string())
+            .or_else(|| self.not_shading.clone())
+    }
+
+    /// What it has done so far; `None` on the CPU.
+    pub(crate) fn summary(&self) -> Option<DeviceSummary> {
+        let device = self.tracing.as_ref()?;
+        let (stats, problem) = (device.stats(), self.shading_problem());
+        let shaded = self
+            .shading
+            .as_ref()
+            .map(|shading| shading.stats())
+            .unwrap_or_default();
+        Some(DeviceSummary {
+            adapter: device.gpu().adapter().name.clone(),
+            rays: stats.rays,
+            unsure_rays: stats.unsure,
+            shading: if self.shading.is_some() && problem.is_none() {
+                "device"
+            } else {
+                "cpu"
+            },
+            shading_problem: problem,
+            surfaces: shaded.surfaces,
+            beams: shaded.beams,
+        })
+    }
+
+    /// Tells what it has done. An error of a device that was to be used is ours, too; what does not fit its limits is left to the
+    /// CPU, and told.
     pub(crate) fn close(&self, quiet: bool) -> Result<(), Failure> {
-        let Self(Some(device), asked) = self else {
+        let Some(device) = &self.tracing else {
             return Ok(());
         };
-        let name = report::clean(&device.gpu().adapter().name);
-        match device.problem() {
-            Some(problem) if *asked == GpuUse::On => Err(Failure::new(Code::Runtime, problem)),
+        let shading = self.shading.as_ref().and_then(|shading| shading.problem());
+        let shading = shading.filter(|problem| !matches!(problem, Error::Limits { .. }));
+        match device.problem().or(shading) {
+            Some(problem) if self.asked == GpuUse::On => {
+                return Err(Failure::new(Code::Runtime, problem));
+            }
             Some(problem) => {
                 report::note(&format!("on the CPU: {}", report::clean(&problem.to_string())));
-                Ok(())
+                return Ok(());
             }
-            None => {
-                let stats = device.stats();
-                if !quiet {
-                    report::note(&format!(
-                        "{name}: {} rays, {} of them answered on the CPU",
-                        thousands(stats.rays),
-                        thousands(stats.unsure)
-                    ));
-                }
-                Ok(())
-            }
+            None => {}
         }
+        if let Some(problem) = self.shading_problem() {
+            report::note(&format!("shaded on the CPU: {}", report::clean(&problem)));
+        }
+        if let Some(done) = self.summary().filter(|_| !quiet) {
+            let shaded = if done.shading == "device" {
+                format!("{} surfaces shaded", thousands(done.surfaces))
+            } else {
+                "shaded on the CPU".to_owned()
+            };
+            report::note(&format!(
+                "{}: {} rays, {} of them answered on the CPU; {shaded}",
+                report::clean(&done.adapter),
+                thousands(done.rays),
+                thousands(done.unsure_rays),
+            ));
+        }
+        Ok(())
     }
 }
 

@@ -100,13 +100,18 @@ pub(crate) fn run(args: &RenderArgs) -> Result<(), Failure> {
         &rendered.stats,
         &times,
         files,
-    );
-    if args.run.json {
-        report::to_stdout_json(&summary)
-    } else {
-        report::note(&summary.text());
-        Ok(())
+    )
+    .with_device(&device);
+    tell(&summary, args.run.json)
+}
+
+/// Tells what a picture was made of and what it cost.
+fn tell(summary: &Summary, json: bool) -> Result<(), Failure> {
+    if json {
+        return report::to_stdout_json(summary);
     }
+    report::note(&summary.text());
+    Ok(())
 }
 
 /// Where the picture, or the part of it, goes.

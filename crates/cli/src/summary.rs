@@ -9,6 +9,7 @@ use rayward::{FrameStats, LightStats, RenderOptions, ShadowStructure};
 use serde::Serialize;
 
 use crate::args::MomentArgs;
+use crate::gpu::{Device, DeviceSummary};
 use crate::input::Input;
 use crate::machine;
 use crate::report::{bytes, clean, count, duration, milliseconds, thousands};
@@ -62,6 +63,8 @@ pub(crate) struct Summary {
     threads: usize,
     simd: &'static str,
     peak_memory_bytes: Option<u64>,
+    /// What a GPU did, if frames are made on one; of an animation, up to here.
+    gpu: Option<DeviceSummary>,
     notices: Vec<String>,
 }
 
@@ -129,7 +132,16 @@ impl Summary {
             threads: rayon::current_num_threads(),
             simd: options.level.name(),
             peak_memory_bytes: machine::peak_memory(),
+            gpu: None,
             notices,
+        }
+    }
+
+    /// The same with what a device has done.
+    pub(crate) fn with_device(self, device: &Device) -> Self {
+        Self {
+            gpu: device.summary(),
+            ..self
         }
     }
 

@@ -269,6 +269,15 @@ pub(crate) enum GpuUse {
     Off,
 }
 
+/// What shades frames whose rays are traced on a GPU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(crate) enum GpuShadingUse {
+    /// The GPU, too
+    Device,
+    /// The CPU: the bits of a frame without a GPU
+    Cpu,
+}
+
 /// A structure for rays from anywhere to anywhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum SecondaryUse {

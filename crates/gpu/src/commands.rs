@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
 use bytemuck::Pod;
-use wgpu::{Buffer, BufferUsages};
+use wgpu::{BindingResource, Buffer, BufferUsages};
 
 use crate::ldc::layout::Scan;
 use crate::ldc::shaders::{Program, SCAN};
@@ -15,6 +15,9 @@ const SIDE: u64 = 65_535;
 
 /// Numbers that a workgroup of `scan.wgsl` sums up.
 const BLOCK: u64 = 1024;
+
+/// Most texels in a row of the texture that holds those of all images.
+const TEXELS: u64 = 4096;
 
 /// Compiled entry points, by program and name.
 #[derive(Debug, Default)]
@@ -64,6 +67,77 @@ impl Gpu {
         Ok(buffer)
     }
 
+    /// Texels one after the other in the rows and layers of a texture that no device is too small for; one at least.
+    pub(crate) fn texels(
+        &self,
+        what: &'static str,
+        pieces: &[&[[u8; 4]]],
+        count: u64,
+    ) -> Result<wgpu::TextureView> {
+        let limits = self.device.limits();
+        let width = u64::from(limits.max_texture_dimension_2d).min(TEXELS);
+        let rows = count.div_ceil(width).max(1);
+        let layers = rows.div_ceil(width);
+        if layers > u64::from(limits.max_texture_array_layers) || count > u64::from(u32::MAX) {
+            return Err(Error::Limits {
+                adapter: self.name(),
+                what,
+                needed: 4 * count,
+                limit: 4 * u64::from(u32::MAX)
+                    .min(width * width * u64::from(limits.max_texture_array_layers)),
+            });
+        }
+        let height = rows.div_ceil(layers);
+        let size = |width: u64, height: u64, layers: u64| wgpu::Extent3d {
+            width: width as u32,
+            height: height as u32,
+            depth_or_array_layers: layers as u32,
+        };
+        let texture = self.scoped(what, || {
+            self.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some(what),
+                size: size(width, height, layers),
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Uint,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+                view_formats: &[],
+            })
+        })?;
+        // Whole layers, the last one filled up.
+        let mut texels = pieces.iter().copied().flatten();
+        for layer in 0..layers {
+            let mut part: Vec<[u8; 4]> = texels.by_ref().take((width * height) as usize).copied().collect();
+            part.resize((width * height) as usize, [0; 4]);
+            self.scoped(what, || {
+                let at = wgpu::TexelCopyTextureInfo {
+                    texture: &texture,
+                    mip_level: 0,
+                    origin: wgpu::Origin3d {
+                        x: 0,
+                        y: 0,
+                        z: layer as u32,
+                    },
+                    aspect: wgpu::TextureAspect::All,
+                };
+                let layout = wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(4 * width as u32),
+                    rows_per_image: Some(height as u32),
+                };
+                let part = bytemuck::cast_slice(&part);
+                self.queue.write_texture(at, part, layout, size(width, height, 1));
+            })?;
+        }
+        self.scoped(what, || {
+            texture.create_view(&wgpu::TextureViewDescriptor {
+                dimension: Some(wgpu::TextureViewDimension::D2Array),
+                ..wgpu::TextureViewDescriptor::default()
+            })
+        })
+    }
+
     /// Constants of a shader.
     pub(crate) fn uniform<T: Pod>(&self, what: &'static str, contents: &T) -> Result<Buffer> {
         self.scoped(what, || {
@@ -110,6 +184,21 @@ impl Gpu {
         bindings: &[(u32, &Buffer)],
         groups: u64,
     ) -> Result<()> {
+        let bindings: Vec<_> = bindings
+            .iter()
+            .map(|&(binding, buffer)| (binding, buffer.as_entire_binding()))
+            .collect();
+        self.dispatch_bound(program, entry, &bindings, groups)
+    }
+
+    /// The same with more than buffers.
+    pub(crate) fn dispatch_bound(
+        &self,
+        program: &Program,
+        entry: &'static str,
+        bindings: &[(u32, BindingResource)],
+        groups: u64,
+    ) -> Result<()> {
         if groups == 0 {
             return Ok(());
         }
@@ -126,9 +215,9 @@ impl Gpu {
         self.scoped(entry, || {
             let entries: Vec<_> = bindings
                 .iter()
-                .map(|&(binding, buffer)| wgpu::BindGroupEntry {
-                    binding,
-                    resource: buffer.as_entire_binding(),
+                .map(|(binding, resource)| wgpu::BindGroupEntry {
+                    binding: *binding,
+                    resource: resource.clone(),
                 })
                 .collect();
             let group = self.device.create_bind_group(&wgpu::BindGroupDescriptor {

@@ -11,6 +11,7 @@
 //! | `batch.rs` | arrays of rays to answers, for all of these |
 //! | `skin/`, `skin.wgsl` | vertices of animated scenes, posed on the device |
 //! | `secondary.rs` | the cube in frames of `rayward` |
+//! | `shade/`, `attributes.wgsl`, `lit.wgsl` and others | surfaces of frames, textures and the light they send |
 //!
 //! [`trace::ldc`] is the reference of every stage. Rays are arrays in, answers arrays out. Hits by samples are those
 //! of the reference but for rounding. Exact answers are those of [`trace::BruteForce`] bit for bit: the GPU has f32
@@ -43,6 +44,7 @@ mod error;
 mod grid;
 mod ldc;
 mod secondary;
+mod shade;
 mod skin;
 #[cfg(test)]
 mod tests;
@@ -55,4 +57,5 @@ pub use error::{Error, Result};
 pub use grid::{GpuGrid, GridGeometry};
 pub use ldc::{Cube, CubeOptions, StillCube, TraceStats};
 pub use secondary::{GpuSecondary, Through};
+pub use shade::{GpuShading, ShadeStats};
 pub use skin::{GpuSkin, PosedVertices};

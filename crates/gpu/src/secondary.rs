@@ -5,7 +5,8 @@
 //! to answer these, too ([`Through`]).
 //!
 //! The hierarchy is built beside them: it answers rays that f32 cannot, batches too small to be worth the way to the
-//! device, and what frames ask ray by ray. So a picture is the same with and without a GPU, bit for bit. If the device
+//! device, and what frames ask ray by ray. So a picture that the CPU shades is the same with and without a GPU, bit for bit; see
+//! [`crate::GpuShading`] for others. If the device
 //! fails, the hierarchy answers all, and [`GpuSecondary::problem`] says why.
 
 use std::ops::ControlFlow;

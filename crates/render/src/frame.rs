@@ -20,7 +20,10 @@ use crate::solids::{self, FrameSolids};
 use crate::structures::FrameStructures;
 use crate::tile::coverage::Sharing;
 use crate::tile::{TileCounts, TileShader};
-use crate::{CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingLight};
+use crate::{
+    CameraFrame, Environment, Film, FrameStats, RenderOptions, Result, Shader, ShadingBuilder, ShadingLight,
+    SurfaceShader,
+};
 
 /// Renders frames of one scene. Keeps what outlives a frame: materials, textures, the topology and clusters.
 #[derive(Debug)]
@@ -29,6 +32,7 @@ pub struct Renderer<'s> {
     shader: Shader<'s>,
     environment: Option<Environment>,
     secondary: Arc<dyn SecondaryBuilder>,
+    shading: Option<Arc<dyn ShadingBuilder>>,
     topology: Option<(Vec<[u32; 3]>, Topology, Clusters)>,
     /// Working memory of the last frame.
     scratch: LitScratch,
@@ -62,6 +66,7 @@ impl<'s> Renderer<'s> {
             shader: Shader::new(scene),
             environment: None,
             secondary: Arc::new(HierarchyBuilder),
+            shading: None,
             topology: None,
             scratch: LitScratch::default(),
         }
@@ -75,6 +80,17 @@ impl<'s> Renderer<'s> {
     /// Has another structure answer rays from anywhere to anywhere. Frames with a lens or a shutter have none.
     pub fn set_secondary(&mut self, builder: Arc<dyn SecondaryBuilder>) {
         self.secondary = builder;
+    }
+
+    /// Has arrays of surfaces shaded by something else, made for [`Self::shader`], or by the CPU again. Frames with a lens or a
+    /// shutter, HM08's parameters or a reference are shaded by the CPU.
+    pub fn set_shading(&mut self, builder: Option<Arc<dyn ShadingBuilder>>) {
+        self.shading = builder;
+    }
+
+    /// Materials and textures of the scene.
+    pub fn shader(&self) -> &Shader<'s> {
+        &self.shader
     }
 
     /// Renders one frame on the threads of the current rayon pool. The picture is the same for any number of
@@ -131,6 +147,7 @@ impl<'s> Renderer<'s> {
             .iter()
             .map(|l| ShadingLight::new(l, geometry.origin))
             .collect();
+        let shading = shading(self.shading.as_deref(), geometry, &shading_lights, options);
         let total = u64::from(structures.eye.tile_count()) * u64::from(samples);
         let done = AtomicU64::new(0);
         let told = || {
@@ -157,6 +174,7 @@ impl<'s> Renderer<'s> {
                     .secondary
                     .as_deref()
                     .map(|all| all as &dyn SecondaryTracer),
+                shading: shading.as_deref(),
                 reference: options.reference.then(|| EveryTriangle(triangles(geometry))),
                 sample,
                 options,
@@ -253,6 +271,17 @@ impl<'s> Renderer<'s> {
             }
         }
     }
+}
+
+/// What shades arrays of a frame, if it is not shaded one by one, as the papers' frames and references are.
+fn shading<'g>(
+    builder: Option<&'g dyn ShadingBuilder>,
+    geometry: &'g FrameGeometry,
+    lights: &[ShadingLight],
+    options: &RenderOptions,
+) -> Option<Arc<dyn SurfaceShader + 'g>> {
+    let one_by_one = options.paper || options.reference;
+    builder.filter(|_| !one_by_one)?.build(geometry, lights)
 }
 
 /// What was counted.

@@ -78,7 +78,10 @@ pub use plan::{FramePlan, LightPlan};
 pub use secondary::{
     BuiltTracer, CubeBuilder, HierarchyBuilder, SecondaryBuilder, SecondaryTracer, SurfaceHit,
 };
-pub use shade::{Incident, Shader, ShadingLight, Surface, SurfacePoint};
+pub use shade::{
+    Beam, CpuShading, Incident, Shader, ShadingBuilder, ShadingLight, Source, Surface, SurfacePoint,
+    SurfaceShader,
+};
 pub use shard::{Part, Shard};
 pub use solids::solids;
 pub use stats::{FrameStats, StructureStats};

@@ -5,6 +5,7 @@ pub(crate) mod coverage;
 mod passes;
 pub(crate) mod soft;
 mod solids;
+mod together;
 
 use std::ops::ControlFlow;
 
@@ -21,13 +22,14 @@ use crate::geometry::triangles;
 use crate::plan::LightPlan;
 use crate::reference::EveryTriangle;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{direct, object_of};
+use crate::shade::{Beam, Source, SurfaceShader, direct, object_of, reaches};
 use crate::solids::{FrameSolids, OnSolid};
 use crate::structures::{FrameStructures, LightShadows};
 use crate::{CameraFrame, Environment, RenderOptions, Shader, ShadingLight, Surface, SurfacePoint};
 use crate::{Sample, TileMut};
 use coverage::{Sharing, TileShares};
 use passes::Passes;
+use together::Together;
 
 /// Everything a tile needs to know of its frame.
 pub(crate) struct TileShader<'f> {
@@ -44,6 +46,8 @@ pub(crate) struct TileShader<'f> {
     pub(crate) environment: Option<&'f Environment>,
     /// What answers the rays that surfaces send, if they send any.
     pub(crate) secondary: Option<&'f dyn SecondaryTracer>,
+    /// What shades arrays, if surfaces are not shaded one by one.
+    pub(crate) shading: Option<&'f dyn SurfaceShader>,
     /// What tests every triangle for every ray, if that is asked for.
     pub(crate) reference: Option<EveryTriangle<'f>>,
     /// Which sample of the pixels this is.
@@ -66,6 +70,9 @@ pub(crate) struct TileWork {
     visible: Vec<u32>,
     area: AreaScratch,
     passes: Passes,
+    /// Pixels that are to be seen.
+    wanted: Vec<[u32; 2]>,
+    together: Together,
     surfaces: u64,
     veils: TileVeils,
     veil_scratch: ShadowScratch,
@@ -173,15 +180,21 @@ impl TileShader<'_> {
         (work.bounce.secondary_rays, work.bounce.shadow_rays) = (0, 0);
         work.scratch.counts = rayward_trace::ShadowCounts::default();
         work.area.counts = AreaCounts::default();
-        for [x, y] in in_blocks(tile.width, tile.height) {
-            if let Some((sharing, shares)) = &mut shares
-                && self.joins(sharing, shares, &tile, [x, y], work)
-            {
-                continue;
-            }
-            let sample = self.see(&tile, [x, y], work);
-            out.put(x, y, &sample);
+        let mut wanted = std::mem::take(&mut work.wanted);
+        wanted.clear();
+        wanted.extend(in_blocks(tile.width, tile.height));
+        if let Some((sharing, shares)) = &mut shares {
+            wanted.retain(|&pixel| !self.joins(sharing, shares, &tile, pixel, work));
         }
+        if let Some(shading) = self.shading {
+            self.see_together(shading, &tile, &wanted, work, out);
+        } else {
+            for &[x, y] in &wanted {
+                let sample = self.see(&tile, [x, y], work);
+                out.put(x, y, &sample);
+            }
+        }
+        work.wanted = wanted;
         for light in self.shadowed_lights() {
             match &self.structures.lights[light] {
                 LightShadows::Area(tree) => self.illuminate_softly(light, tree.light(), &tile, work),
@@ -190,6 +203,9 @@ impl TileShader<'_> {
                     None => self.illuminate(light, index, work),
                 },
             }
+        }
+        if let Some(shading) = self.shading {
+            self.add_beams(shading, work);
         }
         self.illuminate_solids(&tile, work);
         for point in &work.points {
@@ -225,9 +241,14 @@ impl TileShader<'_> {
         } else {
             self.see_through(tile, [x, y], &ray, &mut seen, work);
         }
+        self.finished(seen, &ray)
+    }
+
+    /// The pixel with what is seen behind all surfaces.
+    fn finished(&self, mut seen: Seen, ray: &ViewRay) -> Sample {
         seen.sample.alpha = 1.0 - seen.left;
         if seen.left > 0.0 {
-            seen.sample.color = self.backdrop(&ray) * seen.left;
+            seen.sample.color = self.backdrop(ray) * seen.left;
         }
         seen.sample
     }
@@ -320,25 +341,32 @@ impl TileShader<'_> {
 
     /// The surface where a ray meets a triangle, and its light that needs no shadow rays.
     fn shade(&self, ray: &ViewRay, prim: u32, hit: &ExactHit) -> Shaded {
-        let (depth, object) = (hit.t as f32, object_of(self.geometry, prim));
-        let bary = Vec2::new(hit.u as f32, hit.v as f32);
-        let surface = self.shader.surface(
-            self.geometry,
-            &SurfacePoint {
-                prim,
-                object,
-                u: bary.x,
-                v: bary.y,
-                view: (-ray.dir.normalize()).as_vec3(),
-                footprint: self.cone(depth).width,
-            },
-        );
+        let point = self.point_at(ray, prim, hit);
+        let surface = self.shader.surface(self.geometry, &point);
+        let color = self.resting(&surface, 0);
+        self.shaded(point.object, (prim, hit), surface, color)
+    }
+
+    /// Where a ray meets a triangle, for a surface to be made.
+    fn point_at(&self, ray: &ViewRay, prim: u32, hit: &ExactHit) -> SurfacePoint {
+        SurfacePoint {
+            prim,
+            object: object_of(self.geometry, prim),
+            u: hit.u as f32,
+            v: hit.v as f32,
+            view: (-ray.dir.normalize()).as_vec3(),
+            footprint: self.cone(hit.t as f32).width,
+        }
+    }
+
+    /// A surface where a ray meets a triangle, with this light.
+    fn shaded(&self, object: u32, (prim, hit): (u32, &ExactHit), surface: Surface, color: Vec3) -> Shaded {
         Shaded {
             prim,
             object,
             t: hit.t,
-            bary,
-            color: self.resting(&surface, 0),
+            bary: Vec2::new(hit.u as f32, hit.v as f32),
+            color,
             surface,
         }
     }
@@ -394,12 +422,13 @@ impl TileShader<'_> {
         let beside_solids =
             |receiver: &Receiver| !end.is_some_and(|end| self.solid_hides(light, receiver, &end));
         if let LightShadows::Pixels(lit) = &self.structures.lights[light] {
-            for point in work.points.iter_mut().filter(|point| point.on.is_none()) {
-                let reached = lit.is_lit(tile, point.x, point.y);
-                if let (true, Some(incident)) = (reached, direct(&point.surface, &self.lights[light]))
+            for (i, point) in work.points.iter_mut().enumerate() {
+                if point.on.is_none()
+                    && lit.is_lit(tile, point.x, point.y)
+                    && let Some(radiance) = self.reflected(&point.surface, light)
                     && beside_solids(&point.receiver)
                 {
-                    point.color += incident.radiance;
+                    self.add(light, (i, point), (radiance, Vec3::ONE), &mut work.together.beams);
                 }
             }
             return;
@@ -413,18 +442,19 @@ impl TileShader<'_> {
             veil_scratch,
             passed,
             filters,
+            together,
             ..
         } = work;
         receivers.clear();
         asked.clear();
         for (i, point) in points.iter().enumerate() {
             if point.on.is_none()
-                && let Some(incident) = direct(&point.surface, &self.lights[light])
+                && let Some(radiance) = self.reflected(&point.surface, light)
                 && self.faces(light, &point.receiver)
                 && beside_solids(&point.receiver)
             {
                 receivers.push(point.receiver);
-                asked.push((i as u32, incident.radiance));
+                asked.push((i as u32, radiance));
             }
         }
         self.hidden(light, receivers, scratch, shadow);
@@ -441,7 +471,8 @@ impl TileShader<'_> {
             self.pass(light, receivers, veil_scratch, passed);
         }
         for (&(i, radiance), &passed) in asked.iter().zip(&*passed) {
-            points[i as usize].color += radiance * passed;
+            let point = (i as usize, &mut points[i as usize]);
+            self.add(light, point, (radiance, passed), &mut together.beams);
         }
     }
 
@@ -470,6 +501,35 @@ impl TileShader<'_> {
                 shadow.resize(receivers.len(), false);
             }
         }
+    }
+
+    /// What a surface reflects of a light if nothing is in between; `None` if the light does not reach it. Where arrays are
+    /// shaded it is not known yet, and nothing is told but that.
+    fn reflected(&self, surface: &Surface, light: usize) -> Option<Vec3> {
+        let light = &self.lights[light];
+        if self.shading.is_some() {
+            return reaches(surface, light).then_some(Vec3::ZERO);
+        }
+        direct(surface, light).map(|incident| incident.radiance)
+    }
+
+    /// Adds what a point reflects of the share of a light that arrives, or notes that it does.
+    fn add(
+        &self,
+        light: usize,
+        (index, point): (usize, &mut ShadedPoint),
+        (radiance, share): (Vec3, Vec3),
+        beams: &mut Vec<Beam>,
+    ) {
+        if self.shading.is_none() {
+            point.color += radiance * share;
+            return;
+        }
+        beams.push(Beam {
+            surface: index as u32,
+            share,
+            source: Source::Light(light as u32),
+        });
     }
 
     /// Which receivers an opaque triangle hides from a light, all tested.

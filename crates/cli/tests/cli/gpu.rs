@@ -27,17 +27,47 @@ fn pictures_do_not_depend_on_what_answers_their_rays() {
         .expect(0);
     folder.run(&["compare", "hierarchy.png", "cube.png"]).expect(0);
     let doctor = folder.run(&["doctor", "--json"]).expect(0).json();
-    let on_gpu = folder.run(&small(&["--gpu", "-o", "gpu.png"]));
+    let on_gpu = folder.run(&small(&["--gpu", "--gpu-shading", "cpu", "-o", "gpu.png"]));
     if let Some(name) = doctor["gpu"]["used"].as_str() {
         let told = on_gpu.expect(0).stderr;
         assert!(
-            told.contains(name) && told.contains("answered on the CPU"),
+            told.contains(name) && told.contains("answered on the CPU") && told.contains("shaded on the CPU"),
             "{told}"
         );
         folder.run(&["compare", "hierarchy.png", "gpu.png"]).expect(0);
     } else {
         on_gpu.expect(1).says(&["no GPU"]);
     }
+}
+
+#[test]
+fn frames_are_shaded_on_the_device_and_say_so() {
+    let folder = Folder::new();
+    folder.run(&small(&["-o", "cpu.png"])).expect(0);
+    let on_gpu = folder.run(&small(&["--gpu", "--json", "-o", "gpu.png"]));
+    let doctor = folder.run(&["doctor", "--json"]).expect(0).json();
+    if doctor["gpu"]["used"].is_null() {
+        on_gpu.expect(1).says(&["no GPU"]);
+        return;
+    }
+    let told = on_gpu.expect(0);
+    assert!(told.stderr.contains("surfaces shaded"), "{}", told.stderr);
+    let gpu = &told.json()["gpu"];
+    assert_eq!(
+        (&gpu["shading"], &gpu["adapter"]),
+        (&"device".into(), &doctor["gpu"]["used"])
+    );
+    assert!(gpu["shading_problem"].is_null());
+    let number = |field: &str| gpu[field].as_u64().unwrap_or(0);
+    assert!(
+        number("surfaces") > 1000 && number("beams") > 1000 && number("rays") > 1000,
+        "{gpu}"
+    );
+    folder
+        .run(&["compare", "cpu.png", "gpu.png", "--tolerance", "0.001"])
+        .expect(0);
+    let on_cpu = folder.run(&small(&["--json", "-o", "cpu.png"])).expect(0).json();
+    assert!(on_cpu["gpu"].is_null());
 }
 
 #[test]
@@ -53,5 +83,8 @@ fn a_missing_gpu_is_an_error_or_said() {
     }
     folder
         .run(&small(&["--gpu", "--secondary", "cube", "-o", "a.png"]))
+        .expect(2);
+    folder
+        .run(&small(&["--gpu-shading", "cpu", "-o", "a.png"]))
         .expect(2);
 }

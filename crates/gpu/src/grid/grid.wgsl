@@ -107,5 +107,7 @@ fn order(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: v
     }
     let first = cell_starts[cell];
     let count = cell_starts[cell + 1u] - first;
-    shell_sort(first, count);
+    if count <= LONGEST {
+        shell_sort(first, count);
+    }
 }

@@ -18,9 +18,13 @@ fn answer(index: u32, ray: Ray) -> Found {
     var best = Best(Verdict(MISS, FAR, FAR), NONE, FAR);
     var tests = 0u;
     var looked = 0u;
-    if ray.end >= 0.0 {
-        let last = starts[place.cell + 1u];
-        for (var s = starts[place.cell]; s < last && !settled(best); s++) {
+    let first = starts[place.cell];
+    let last = starts[place.cell + 1u];
+    if ray.end >= 0.0 && last - first > LONGEST {
+        // Not in order.
+        best.verdict.state = UNSURE;
+    } else if ray.end >= 0.0 {
+        for (var s = first; s < last && !settled(best); s++) {
             let entry = entries[s];
             let further = place.rate * min(ray.end, best.verdict.high);
             let slack = 1e-5 * (abs(place.depth) + abs(further));

@@ -133,3 +133,27 @@ fn what_cannot_be_projected_has_no_grid_and_nothing_has_an_empty_one() {
     let answers = grid.shadowed(&receivers, &light, &bvh);
     assert!(answers.is_ok_and(|(dark, _)| dark == [false]));
 }
+
+#[test]
+fn cells_too_long_to_be_put_in_order_are_left_to_the_cpu() {
+    let Some(gpu) = gpu() else { return };
+    // Thousands of triangles behind each other, those in front mostly with a hole where the rays are.
+    let mut numbers = Numbers(9);
+    let mut mesh = Mesh::default();
+    for _ in 0..20_000 {
+        let z = numbers.next();
+        let middle = Vec3::new(numbers.next() * 0.2, numbers.next() * 0.2, z);
+        mesh.triangle([(); 3].map(|()| middle + numbers.point() * Vec3::new(0.05, 0.05, 0.0)));
+    }
+    let triangles = mesh.triangles();
+    let bvh = Bvh::build(triangles);
+    let geometry = GridGeometry::new(&gpu, triangles).unwrap_or_else(|e| panic!("{e}"));
+    let view = looking(Vec3::new(0.02, 0.01, 6.0), Vec3::ZERO, 0.06, [16, 16]);
+    let grid = GpuGrid::of_camera(&geometry, &view).unwrap_or_else(|e| panic!("{e}"));
+    let pixels: Vec<[u32; 2]> = (0..256).map(|i| [i % 16, i / 16]).collect();
+    let (seen, stats) = grid.seen(&pixels, &bvh).unwrap_or_else(|e| panic!("{e}"));
+    for (&[x, y], &prim) in pixels.iter().zip(&seen) {
+        assert_eq!(prim, first(triangles, &view.pixel_ray(x, y)), "{x}, {y}");
+    }
+    assert!(stats.unsure > 100, "{stats:?}");
+}

@@ -101,10 +101,28 @@ pub(crate) const SKIN: Program = Program {
     source: include_str!("../skin/skin.wgsl"),
 };
 
+pub(crate) const SURFACES: Program = Program {
+    name: "attributes.wgsl",
+    source: concat!(
+        include_str!("../shade/surface.wgsl"),
+        include_str!("../shade/attributes.wgsl"),
+        include_str!("../shade/texture.wgsl"),
+    ),
+};
+
+pub(crate) const LIT: Program = Program {
+    name: "lit.wgsl",
+    source: concat!(
+        include_str!("../shade/surface.wgsl"),
+        include_str!("../shade/brdf.wgsl"),
+        include_str!("../shade/lit.wgsl"),
+    ),
+};
+
 /// All programs.
 #[cfg(test)]
-pub(crate) const ALL: [&Program; 11] = [
-    &RASTER, &SCAN, &SORT, &PACK, &LEVELS, &SAMPLED, &EXACT, &TREE, &GRID, &LOOK, &SKIN,
+pub(crate) const ALL: [&Program; 13] = [
+    &RASTER, &SCAN, &SORT, &PACK, &LEVELS, &SAMPLED, &EXACT, &TREE, &GRID, &LOOK, &SKIN, &SURFACES, &LIT,
 ];
 
 #[cfg(test)]
@@ -117,6 +135,7 @@ mod tests {
     use crate::bvh::Node;
     use crate::grid::{Grid, Place, Plate};
     use crate::ldc::layout::{Found, Frame, Query, Raise, Scan, TexelRay};
+    use crate::shade::layout::{BeamRow, Lamp, Level, Lit, Material, Point, Row, Shading, Triangle, Use};
     use crate::skin::{Influence, Skin};
 
     fn parsed(program: &Program) -> (naga::Module, ModuleInfo) {
@@ -252,6 +271,132 @@ mod tests {
                 program, "Found", Found, t, prim, state, cells, texels, samples, triangles, pad
             );
             same_layout!(program, "Query", Query, rays, test, tolerance, any);
+        }
+    }
+
+    #[test]
+    fn what_surfaces_are_made_of_is_laid_out_as_in_the_shaders() {
+        same_layout!(
+            SURFACES, "Shading", Shading, points, normals, tangents, colors, uvs, uvs1, pad_a, pad_b, srgb
+        );
+        same_layout!(SURFACES, "Point", Point, view, footprint, prim, u, v, pad);
+        same_layout!(
+            SURFACES,
+            "Triangle",
+            Triangle,
+            normal,
+            doubled_area,
+            corner_a,
+            corner_b,
+            corner_c,
+            material
+        );
+        same_layout!(
+            SURFACES,
+            "Material",
+            Material,
+            base_color,
+            emissive,
+            metallic,
+            specular_color,
+            roughness,
+            absorption,
+            ior_reflectance,
+            specular,
+            transmission,
+            ior,
+            normal_scale,
+            occlusion_strength,
+            alpha_mode,
+            cutoff,
+            flags,
+            coat_factor,
+            coat_roughness,
+            coat_normal_scale,
+            pad,
+            textures
+        );
+        same_layout!(
+            SURFACES,
+            "Use",
+            Use,
+            columns,
+            offset,
+            density,
+            flags,
+            first_level,
+            levels,
+            pad_a,
+            pad_b
+        );
+        same_layout!(SURFACES, "Level", Level, width, height, first, pad);
+    }
+
+    #[test]
+    fn light_is_laid_out_as_in_the_shaders() {
+        same_layout!(LIT, "Lit", Lit, surfaces, pad_a, pad_b, pad_c);
+        same_layout!(
+            LIT,
+            "Lamp",
+            Lamp,
+            position,
+            kind,
+            direction,
+            inverse_range2,
+            power,
+            radius,
+            scale,
+            offset,
+            pad_a,
+            pad_b
+        );
+        same_layout!(
+            LIT,
+            "Beam",
+            BeamRow,
+            end,
+            kind,
+            share,
+            which,
+            radiance,
+            density,
+            drawn_own,
+            drawn_coat,
+            drawn_diffuse,
+            pad
+        );
+    }
+
+    #[test]
+    fn surfaces_are_laid_out_as_in_the_shaders() {
+        for program in [SURFACES, LIT] {
+            same_layout!(
+                program,
+                "Surface",
+                Row,
+                position,
+                flags,
+                geometric_normal,
+                alpha,
+                normal,
+                metallic,
+                view,
+                roughness,
+                base_color,
+                specular,
+                f0,
+                transmission,
+                emissive,
+                ior,
+                absorption,
+                occlusion,
+                coat_normal,
+                coat_reflectance,
+                coat_passed,
+                coat_roughness,
+                pad_a,
+                pad_b
+            );
         }
     }
 }

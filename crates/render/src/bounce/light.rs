@@ -23,7 +23,7 @@ use rayward_trace::{AreaLight, Light, exact};
 use super::{Arrival, BounceWork, Flight, GLOSSY, SURROUNDING, absorbed};
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{Iridescence, LightRays, SurfaceFinish, Traced, brdf, direct, direct_beside, lobes};
+use crate::shade::{Iridescence, LightRays, SurfaceFinish, direct, direct_beside, lobes, lobes_lit};
 use crate::solids::FrameSolids;
 use crate::tile::{TileShader, soft};
 use crate::{ShadingLight, Surface};
@@ -34,7 +34,7 @@ pub(super) fn shows_lights(mirror: &Surface) -> bool {
 }
 
 /// An arrival's surface as lights are seen by it: that of a mirror on the way of a diffuse ray reflects none.
-fn lit_surface(arrival: &Arrival) -> Surface {
+pub(super) fn lit_surface(arrival: &Arrival) -> Surface {
     let mut surface = arrival.surface;
     if arrival.diffused && surface.coat.roughness < lobes::SMOOTH {
         surface.coat.reflectance = 0.0;
@@ -187,18 +187,7 @@ impl TileShader<'_> {
             if surface.unlit || arrival.weight == Vec3::ZERO {
                 continue;
             }
-            let traced = self.traced(surface, arrival.bounces);
-            let rays = [
-                self.reflected_rays(surface, arrival.sharp),
-                self.diffused_rays(surface, arrival.sharp),
-            ];
-            let coat = surface.coated().map(|coat| {
-                let traced = Traced {
-                    reflection: traced.coat,
-                    ..Traced::default()
-                };
-                (coat, traced, [self.reflected_rays(&coat, arrival.sharp), 0])
-            });
+            let rays = self.environment_rays(surface, (arrival.bounces, arrival.sharp));
             let directions = self.directions(arrival.sharp);
             for i in 0..directions {
                 let random = self.draw(arrival.path, SURROUNDING, self.sample * directions + i);
@@ -208,11 +197,7 @@ impl TileShader<'_> {
                     continue;
                 }
                 let drawn = directions as f32 * sample.density;
-                let mut lit = lobes_lit(surface, towards, traced, rays, drawn);
-                if let Some((coat, traced, rays)) = &coat {
-                    lit += lobes_lit(coat, towards, *traced, *rays, drawn);
-                }
-                lit *= sample.radiance;
+                let lit = lobes_lit(surface, towards, drawn, rays) * sample.radiance;
                 if lit.max_element() <= 0.0 {
                     continue;
                 }
@@ -221,6 +206,26 @@ impl TileShader<'_> {
                 arrival.color += lit * self.passed(tracer, arrival, (None, &end), &mut work.filters);
             }
         }
+    }
+
+    /// Rays of a surface that see the environment where nothing is in between: of its own reflection, its coat's, and of diffuse
+    /// light; 0 of what is not traced.
+    pub(super) fn environment_rays(&self, surface: &Surface, (bounces, sharp): (u32, f32)) -> [u32; 3] {
+        let traced = self.traced(surface, bounces);
+        let coat = surface.coated().filter(|_| traced.coat);
+        [
+            if traced.reflection {
+                self.reflected_rays(surface, sharp)
+            } else {
+                0
+            },
+            coat.map_or(0, |coat| self.reflected_rays(&coat, sharp)),
+            if traced.diffusion {
+                self.diffused_rays(surface, sharp)
+            } else {
+                0
+            },
+        ]
     }
 
     /// Radiance where a ray meets nothing.
@@ -242,7 +247,7 @@ impl TileShader<'_> {
     }
 
     /// Share of a light, which has an index if it is one of the scene's, that reaches an arrival.
-    fn passed(
+    pub(super) fn passed(
         &self,
         tracer: &dyn SecondaryTracer,
         arrival: &Arrival,
@@ -277,34 +282,11 @@ impl TileShader<'_> {
 
     /// Whether a light is on the side of an arrival's triangle that is seen. What faces the light on a solid is told by its
     /// normal alone, which is that of shading.
-    fn is_turned_to(&self, end: &Light, arrival: &Arrival) -> bool {
+    pub(super) fn is_turned_to(&self, end: &Light, arrival: &Arrival) -> bool {
         if arrival.on.is_some() {
             return true;
         }
         let corners = triangles(self.geometry).corners(arrival.receiver.prim);
         exact::same_side(corners, end, &arrival.seen_from)
     }
-}
-
-/// The reflection model times the cosine over the density drawn with, each lobe with the share that drawn directions have of
-/// its light. Reflection and diffusion draw as many rays as given.
-fn lobes_lit(surface: &Surface, towards: Vec3, traced: Traced, rays: [u32; 2], drawn: f32) -> Vec3 {
-    let cos = surface.normal.dot(towards);
-    if cos <= 0.0 {
-        return Vec3::ZERO;
-    }
-    let density = |traced: bool, density: fn(&Surface, Vec3) -> f32, rays: u32| {
-        if traced {
-            rays as f32 * density(surface, towards)
-        } else {
-            0.0
-        }
-    };
-    let diffused = density(traced.diffusion, lobes::diffusion_density, rays[1]);
-    let mut lit = brdf::diffuse(surface, towards) * (drawn / (drawn + diffused));
-    if !lobes::is_smooth(surface) {
-        let reflected = density(traced.reflection, lobes::reflection_density, rays[0]);
-        lit += brdf::specular(surface, towards) * (drawn / (drawn + reflected));
-    }
-    lit * (cos / drawn)
 }

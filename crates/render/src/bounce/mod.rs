@@ -17,6 +17,7 @@
 //! walls, but not through boundaries of volumes, which cast shadows like all else: such light is found only by diffuse
 //! rays that meet the glass.
 
+mod beams;
 mod light;
 
 use glam::Vec3;
@@ -95,6 +96,14 @@ impl Flight {
             self.absorption
         }
     }
+
+    /// The pixel's footprint after this distance.
+    fn cone_after(&self, distance: f32) -> Cone {
+        Cone {
+            width: self.cone.width + self.cone.spread * distance,
+            ..self.cone
+        }
+    }
 }
 
 /// Width of a sample's footprint along a ray, metres, and its growth per metre.
@@ -161,7 +170,7 @@ impl TileShader<'_> {
     }
 
     /// Which lobes of a surface go on after this many bounces.
-    fn traced(&self, surface: &Surface, bounces: u32) -> Traced {
+    pub(crate) fn traced(&self, surface: &Surface, bounces: u32) -> Traced {
         if self.secondary.is_none() || surface.unlit || bounces >= self.options.bounces {
             return Traced::default();
         }
@@ -177,15 +186,26 @@ impl TileShader<'_> {
 
     /// Light of a surface that comes neither from a light nor along a traced ray: its own, and that from around.
     pub(crate) fn resting(&self, surface: &Surface, bounces: u32) -> Vec3 {
-        let surrounding = if self.environment.is_some() {
+        let (surrounding, traced) = self.surrounding(surface, bounces);
+        let mut light = around(surface, surrounding, traced);
+        self.show_environment(surface, traced, &mut light);
+        light
+    }
+
+    /// Radiance of the surrounding for lobes of a surface that are not traced, and those that are.
+    pub(crate) fn surrounding(&self, surface: &Surface, bounces: u32) -> (Vec3, Traced) {
+        let radiance = if self.environment.is_some() {
             Vec3::ZERO
         } else {
             self.options.ambient
         };
-        let traced = self.traced(surface, bounces);
-        let mut light = around(surface, surrounding, traced);
+        (radiance, self.traced(surface, bounces))
+    }
+
+    /// Adds the environment as mirrors that are not traced show it.
+    pub(crate) fn show_environment(&self, surface: &Surface, traced: Traced, light: &mut Vec3) {
         let Some(environment) = self.environment.filter(|_| !surface.unlit) else {
-            return light;
+            return;
         };
         let mut show = |mirror: &Surface, traced: bool| {
             if !traced
@@ -193,14 +213,13 @@ impl TileShader<'_> {
                 && let Some(lobe) = lobes::reflected(mirror, [0.5; 2])
             {
                 // No direction that is drawn from the environment falls into a mirror's lobe.
-                light += lobe.weight * environment.radiance(lobe.towards);
+                *light += lobe.weight * environment.radiance(lobe.towards);
             }
         };
         show(surface, traced.reflection);
         if let Some(coat) = surface.coated() {
             show(&coat, traced.coat);
         }
-        light
     }
 
     /// What is seen along a ray where no surface is.
@@ -223,7 +242,7 @@ impl TileShader<'_> {
         bounce
             .arrivals
             .extend(points.iter().map(|point| self.arrival(tile, point)));
-        self.surround(tracer, bounce);
+        self.surround_arrivals(tracer, bounce);
         for arrival in &bounce.arrivals {
             add(out, arrival.pixel, arrival.weight * arrival.color);
         }
@@ -282,7 +301,9 @@ impl TileShader<'_> {
             for flight in &work.flights {
                 self.measure_ray(flight.pixel, &flight.ray, out);
             }
+            let mut made = self.made_together(&work.flights, &work.hits);
             for (flight, hit) in work.flights.iter().zip(&work.hits) {
+                let made = hit.and_then(|_| made.next());
                 let end = hit.map_or(f64::INFINITY, |(_, hit)| hit.t);
                 let solid = self.solid_before(flight, end);
                 let nearest = solid.map_or(end, |(_, crossing)| crossing.t);
@@ -295,12 +316,11 @@ impl TileShader<'_> {
                     continue;
                 }
                 match hit {
-                    Some(hit) => self.arrive(flight, hit, &mut work.arrivals, &mut work.next),
+                    Some(hit) => self.arrive(flight, hit, made, &mut work.arrivals, &mut work.next),
                     None => add(out, flight.pixel, flight.weight * self.beyond(flight)),
                 }
             }
-            self.illuminate_arrivals(tracer, work);
-            self.surround(tracer, work);
+            self.light_up_arrivals(tracer, work);
             for arrival in &work.arrivals {
                 add(out, arrival.pixel, arrival.weight * arrival.color);
                 self.depart(arrival, &mut work.next);
@@ -313,26 +333,16 @@ impl TileShader<'_> {
         &self,
         flight: &Flight,
         &(prim, hit): &(u32, exact::ExactHit),
+        made: Option<Surface>,
         arrivals: &mut Vec<Arrival>,
         next: &mut Vec<Flight>,
     ) {
-        let length = flight.ray.dir.length();
-        let distance = hit.t as f32 * length;
-        let cone = Cone {
-            width: flight.cone.width + flight.cone.spread * distance,
-            ..flight.cone
-        };
-        let surface = self.shader.surface(
-            self.geometry,
-            &SurfacePoint {
-                prim,
-                object: object_of(self.geometry, prim),
-                u: hit.u as f32,
-                v: hit.v as f32,
-                view: -flight.ray.dir / length,
-                footprint: cone.width,
-            },
-        );
+        let distance = hit.t as f32 * flight.ray.dir.length();
+        let cone = flight.cone_after(distance);
+        let surface = made.unwrap_or_else(|| {
+            self.shader
+                .surface(self.geometry, &self.met_at(flight, prim, &hit))
+        });
         let inside = flight.absorption_until(&surface);
         let weight = flight.weight * absorbed(inside, distance);
         let receiver = Receiver::along(&flight.ray.line(), hit.t, prim);
@@ -364,9 +374,22 @@ impl TileShader<'_> {
                 path: flight.path,
                 absorption: inside,
                 seen_from: flight.ray.looked_at_from(),
-                color: self.resting(&surface, flight.bounces),
+                color: self.resting_unless_together(&surface, flight.bounces),
                 surface,
             });
+        }
+    }
+
+    /// Where a ray meets a triangle, for a surface to be made.
+    fn met_at(&self, flight: &Flight, prim: u32, hit: &exact::ExactHit) -> SurfacePoint {
+        let length = flight.ray.dir.length();
+        SurfacePoint {
+            prim,
+            object: object_of(self.geometry, prim),
+            u: hit.u as f32,
+            v: hit.v as f32,
+            view: -flight.ray.dir / length,
+            footprint: flight.cone_after(hit.t as f32 * length).width,
         }
     }
 
@@ -403,14 +426,11 @@ impl TileShader<'_> {
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,
-            cone: Cone {
-                width: flight.cone.width + flight.cone.spread * distance,
-                ..flight.cone
-            },
+            cone: flight.cone_after(distance),
             path: flight.path,
             absorption: inside,
             seen_from: flight.ray.looked_at_from(),
-            color: self.resting(&surface, flight.bounces),
+            color: self.resting_unless_together(&surface, flight.bounces),
             surface,
         });
     }

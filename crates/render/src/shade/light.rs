@@ -27,24 +27,31 @@ pub struct Incident {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadingLight {
     /// Position in the local frame, metres.
-    position: Vec3,
+    pub position: Vec3,
     /// Unit direction in which it shines.
-    direction: Vec3,
-    power: Vec3,
+    pub direction: Vec3,
+    /// Intensity, illuminance, or radiance times area.
+    pub power: Vec3,
     /// 1 / range^2, 0 without a range.
-    inverse_range2: f32,
+    pub inverse_range2: f32,
     /// Of a sphere; 0 for others.
-    radius: f32,
-    distribution: Distribution,
+    pub radius: f32,
+    /// How its light is spread.
+    pub distribution: Distribution,
 }
 
+/// How the light of a source is spread over directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Distribution {
+pub enum Distribution {
+    /// From one direction, the same everywhere.
     Directional,
+    /// Evenly.
     Point,
     /// Squared linear falloff in the cosine between the two angles.
     Spot {
+        /// Falloff for a unit of the cosine.
         scale: f32,
+        /// Falloff at a cosine of 0.
         offset: f32,
     },
     /// One side of a plane.
@@ -124,6 +131,12 @@ impl ShadingLight {
             }
         }
         Some(incident)
+    }
+
+    /// As [`Self::incident_from`], with the size of the light that shading knows.
+    pub(crate) fn incident_beside(&self, sample: &Light, point: Vec3) -> Option<Incident> {
+        let area = AreaLight::sphere(self.position, self.radius);
+        self.incident_from(&area, sample, point)
     }
 
     /// What arrives at a point from the light if it stood at `position`.

@@ -11,19 +11,23 @@
 //!
 //! Cost: no allocation, no dynamic calls; some 70 ns a surface, 80 ns a trilinear texture and 50 ns a light.
 
+mod batch;
 pub mod brdf;
 mod coat;
 mod finish;
 mod light;
 pub mod lobes;
+mod material;
 mod surface;
 
 use glam::Vec3;
 use rayward_trace::{AreaLight, Light};
 
+pub use batch::{Beam, CpuShading, ShadingBuilder, Source, SurfaceShader};
 pub use coat::Coat;
 pub use finish::{Anisotropy, Iridescence, Sheen, SurfaceFinish};
-pub use light::{Incident, ShadingLight};
+pub use light::{Distribution, Incident, ShadingLight};
+pub use material::{ShaderCoat, ShaderMaterial};
 pub use surface::{Shader, Surface, SurfacePoint, object_of};
 
 /// Radiance that a surface sends to the viewer because of one light, if nothing is between the two. `None` if
@@ -62,10 +66,21 @@ pub(crate) fn direct_beside(
         return None;
     }
     let incident = light.incident_from(area, sample, surface.position)?;
-    if rays.drawn == [0; 2] {
+    let density = rays.density(area, surface.position, incident.towards);
+    reflected_beside(surface, incident, density, rays.drawn)
+}
+
+/// What a surface reflects of a sample of a light, of which it has so many per steradian, where so many rays of its own
+/// reflection and its coat's meet the light, too.
+fn reflected_beside(
+    surface: &Surface,
+    incident: Incident,
+    density: f32,
+    drawn: [u32; 2],
+) -> Option<Incident> {
+    if drawn == [0; 2] {
         return reflected(surface, incident, &[1.0; 2]);
     }
-    let density = area.met(surface.position.as_dvec3(), incident.towards).0 * rays.samples as f32;
     let share = |mirror: &Surface, drawn: u32| {
         if drawn == 0 {
             return 1.0;
@@ -80,8 +95,36 @@ pub(crate) fn direct_beside(
             1.0
         }
     };
-    let coat = surface.coated().map_or(1.0, |coat| share(&coat, rays.drawn[1]));
-    reflected(surface, incident, &[share(surface, rays.drawn[0]), coat])
+    let coat = surface.coated().map_or(1.0, |coat| share(&coat, drawn[1]));
+    reflected(surface, incident, &[share(surface, drawn[0]), coat])
+}
+
+/// Whether [`direct`] is anything, without the reflection model.
+pub(crate) fn reaches(surface: &Surface, light: &ShadingLight) -> bool {
+    let incident = || light.incident(surface.position);
+    !surface.unlit && incident().is_some_and(|incident| faces(surface, incident.towards))
+}
+
+/// The same of [`direct_from`].
+pub(crate) fn reaches_from(
+    surface: &Surface,
+    light: &ShadingLight,
+    area: &AreaLight,
+    sample: &Light,
+) -> bool {
+    let incident = || light.incident_from(area, sample, surface.position);
+    !surface.unlit && incident().is_some_and(|incident| faces(surface, incident.towards))
+}
+
+/// Whether light from a direction arrives on the viewer's side of the surface, or of its coat.
+#[inline]
+fn faces(surface: &Surface, towards: Vec3) -> bool {
+    let coated = || {
+        surface
+            .coated()
+            .is_some_and(|coat| coat.normal.dot(towards) > 0.0)
+    };
+    (surface.normal.dot(towards) > 0.0 || coated()) && surface.geometric_normal.dot(towards) > 0.0
 }
 
 /// Rays of a surface's reflections that see lights with a size.
@@ -93,14 +136,23 @@ pub(crate) struct LightRays {
     pub(crate) drawn: [u32; 2],
 }
 
+impl LightRays {
+    /// Samples per steradian that a point has of a light in a direction; not asked for where no rays are drawn.
+    pub(crate) fn density(&self, area: &AreaLight, point: Vec3, towards: Vec3) -> f32 {
+        if self.drawn == [0; 2] {
+            return 0.0;
+        }
+        area.met(point.as_dvec3(), towards).0 * self.samples as f32
+    }
+}
+
 /// What a surface reflects of the light that arrives, its own and its coat's highlights by these shares.
 #[inline]
 fn reflected(surface: &Surface, mut incident: Incident, shares: &[f32; 2]) -> Option<Incident> {
     let towards = incident.towards;
     let cos = surface.normal.dot(towards);
     let coat = surface.coated().map(|coat| (coat, coat.normal.dot(towards)));
-    let faces = cos > 0.0 || coat.is_some_and(|(_, cos)| cos > 0.0);
-    if !faces || surface.geometric_normal.dot(towards) <= 0.0 {
+    if !faces(surface, towards) {
         return None;
     }
     let highlight = brdf::specular(surface, towards) * shares[0];
@@ -161,4 +213,47 @@ pub fn around(surface: &Surface, surrounding: Vec3, traced: Traced) -> Vec3 {
     let below = surface.occlusion * (left * sheen.passed);
     let around = surrounding * surface.base_color * below + surrounding * fibres;
     (surface.emissive + around) * surface.coat.passed + surrounding * coat * surface.occlusion
+}
+
+/// What a surface reflects of light from a direction, of which so many per steradian are drawn, over that density: the model
+/// times the cosine, each lobe with the share that drawn directions have of its light. Its own reflection, its coat's and
+/// diffuse light draw as many rays as given, none if they are not traced.
+pub(crate) fn lobes_lit(surface: &Surface, towards: Vec3, drawn: f32, rays: [u32; 3]) -> Vec3 {
+    let mut lit = own_lobes_lit(surface, towards, drawn, [rays[0], rays[2]]);
+    if let Some(coat) = surface.coated() {
+        lit += own_lobes_lit(&coat, towards, drawn, [rays[1], 0]);
+    }
+    lit
+}
+
+/// As [`lobes_lit`], below the coat.
+fn own_lobes_lit(surface: &Surface, towards: Vec3, drawn: f32, [reflected, diffused]: [u32; 2]) -> Vec3 {
+    let cos = surface.normal.dot(towards);
+    if cos <= 0.0 {
+        return Vec3::ZERO;
+    }
+    let density = |density: fn(&Surface, Vec3) -> f32, rays: u32| {
+        if rays > 0 {
+            rays as f32 * density(surface, towards)
+        } else {
+            0.0
+        }
+    };
+    let diffused = density(lobes::diffusion_density, diffused);
+    let mut lit = brdf::diffuse(surface, towards) * (drawn / (drawn + diffused));
+    if !lobes::is_smooth(surface) {
+        let reflected = density(lobes::reflection_density, reflected);
+        lit += brdf::specular(surface, towards) * (drawn / (drawn + reflected));
+    }
+    lit * (cos / drawn)
+}
+
+/// Whether [`lobes_lit`] may be anything.
+pub(crate) fn lobes_face(surface: &Surface, towards: Vec3) -> bool {
+    let rough = |mirror: &Surface| !lobes::is_smooth(mirror);
+    let fibres = surface.finish.sheen.color != Vec3::ZERO;
+    let diffuse = fibres || (surface.metallic < 1.0 && surface.transmission < 1.0);
+    let own = (diffuse || rough(surface)) && surface.normal.dot(towards) > 0.0;
+    let of_coat = |coat: Surface| rough(&coat) && coat.normal.dot(towards) > 0.0;
+    surface.geometric_normal.dot(towards) > 0.0 && (own || surface.coated().is_some_and(of_coat))
 }

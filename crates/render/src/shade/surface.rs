@@ -10,14 +10,14 @@
 
 use glam::{DVec3, Vec2, Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
-use rayward_scene::{AlphaMode, FrameGeometry, Material, Scene, TextureRef};
+use rayward_scene::{AlphaMode, FrameGeometry, Scene};
 use rayward_trace::solids::Crossing;
 
 use super::coat::Coat;
-use super::finish::{self, Finish, SurfaceFinish};
+use super::finish::{self, SurfaceFinish};
 use super::lobes::seen_normal;
-use crate::casters::is_thin_glass;
-use crate::texture::{Encoding, Texture, Textures};
+use super::material::{ShaderCoat, ShaderMaterial, references};
+use crate::texture::{Texture, Textures};
 
 /// A point on a surface of the frame, as seen from somewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,154 +119,6 @@ pub struct Shader<'s> {
     textures: Textures<'s>,
 }
 
-/// A material with its textures resolved.
-#[derive(Clone, Debug)]
-struct ShaderMaterial {
-    base_color: Vec4,
-    metallic: f32,
-    roughness: f32,
-    emissive: Vec3,
-    /// Reflectance at normal incidence by the index of refraction alone.
-    ior_reflectance: f32,
-    specular: f32,
-    specular_color: Vec3,
-    transmission: f32,
-    ior: f32,
-    thin: bool,
-    thin_glass: bool,
-    absorption: Vec3,
-    normal_scale: f32,
-    occlusion_strength: f32,
-    alpha_mode: AlphaMode,
-    unlit: bool,
-    textured: bool,
-    base_color_texture: Option<Texture>,
-    metallic_roughness_texture: Option<Texture>,
-    normal_texture: Option<Texture>,
-    occlusion_texture: Option<Texture>,
-    emissive_texture: Option<Texture>,
-    specular_texture: Option<Texture>,
-    specular_color_texture: Option<Texture>,
-    transmission_texture: Option<Texture>,
-    finish: Option<Box<Finish>>,
-    coat: ShaderCoat,
-}
-
-/// A coat with its textures resolved.
-#[derive(Clone, Debug)]
-struct ShaderCoat {
-    factor: f32,
-    roughness: f32,
-    normal_scale: f32,
-    texture: Option<Texture>,
-    roughness_texture: Option<Texture>,
-    normal_texture: Option<Texture>,
-}
-
-/// The texture references of a material that shading uses, with their encodings.
-fn references(material: &Material) -> [(Option<TextureRef>, Encoding); 11] {
-    [
-        (material.base_color_texture, Encoding::Srgb),
-        (material.metallic_roughness_texture, Encoding::Linear),
-        (material.normal_texture, Encoding::Linear),
-        (material.occlusion_texture, Encoding::Linear),
-        (material.emissive_texture, Encoding::Srgb),
-        (material.specular_texture, Encoding::Linear),
-        (material.specular_color_texture, Encoding::Srgb),
-        (material.transmission_texture, Encoding::Linear),
-        (material.coat.texture, Encoding::Linear),
-        (material.coat.roughness_texture, Encoding::Linear),
-        (material.coat.normal_texture, Encoding::Linear),
-    ]
-}
-
-/// Absorption per metre that leaves `attenuation_color` of white light after `attenuation_distance`
-/// (`KHR_materials_volume`).
-fn absorption(material: &Material) -> Vec3 {
-    // A colour of exactly 0 would need infinite absorption; this leaves less than a millionth.
-    let left = material.attenuation_color.clamp(Vec3::splat(1e-6), Vec3::ONE);
-    if material.thickness > 0.0 && material.attenuation_distance > 0.0 {
-        -Vec3::new(left.x.ln(), left.y.ln(), left.z.ln()) / material.attenuation_distance
-    } else {
-        Vec3::ZERO
-    }
-}
-
-impl ShaderMaterial {
-    fn new(material: &Material, scene: &Scene, textures: &Textures) -> Self {
-        let resolved = references(material)
-            .map(|(reference, encoding)| reference.and_then(|r| textures.resolve(scene, &r, encoding)));
-        let ratio = (material.ior - 1.0) / (material.ior + 1.0);
-        let finish = Finish::new(material, scene, textures).map(Box::new);
-        Self {
-            base_color: material.base_color,
-            metallic: material.metallic,
-            roughness: material.roughness,
-            emissive: material.emissive,
-            ior_reflectance: ratio * ratio,
-            specular: material.specular,
-            specular_color: material.specular_color,
-            transmission: material.transmission,
-            ior: material.ior,
-            thin: material.thickness <= 0.0,
-            thin_glass: is_thin_glass(material),
-            absorption: absorption(material),
-            normal_scale: material.normal_scale,
-            occlusion_strength: material.occlusion_strength,
-            alpha_mode: material.alpha_mode,
-            unlit: material.unlit,
-            textured: resolved.iter().any(Option::is_some)
-                || finish.as_ref().is_some_and(|finish| finish.is_textured()),
-            finish,
-            base_color_texture: resolved[0],
-            metallic_roughness_texture: resolved[1],
-            normal_texture: resolved[2],
-            occlusion_texture: resolved[3],
-            emissive_texture: resolved[4],
-            specular_texture: resolved[5],
-            specular_color_texture: resolved[6],
-            transmission_texture: resolved[7],
-            coat: ShaderCoat {
-                factor: material.coat.factor,
-                roughness: material.coat.roughness,
-                normal_scale: material.coat.normal_scale,
-                texture: resolved[8],
-                roughness_texture: resolved[9],
-                normal_texture: resolved[10],
-            },
-        }
-    }
-
-    fn is_opaque(&self) -> bool {
-        self.alpha_mode == AlphaMode::Opaque && !self.thin_glass
-    }
-
-    /// Share of light that goes straight through what is covered, but for its colour.
-    fn passed(&self, lookup: &Lookup) -> f32 {
-        if !self.thin_glass {
-            return 0.0;
-        }
-        let texel = |texture| lookup.get(texture).unwrap_or(Vec4::ONE);
-        let metallic = (self.metallic * texel(&self.metallic_roughness_texture).z).clamp(0.0, 1.0);
-        let through = self.transmission * texel(&self.transmission_texture).x;
-        let bare = Vec3::splat(self.ior_reflectance * self.specular);
-        let film = self
-            .finish
-            .as_ref()
-            .map(|finish| finish.film(&|texture| lookup.get(texture)));
-        let reflected = film.map_or(bare, |film| film.over(bare, bare, 1.0));
-        through * (1.0 - metallic) * (1.0 - reflected.max_element()).max(0.0)
-    }
-
-    fn coverage(&self, alpha: f32) -> f32 {
-        match self.alpha_mode {
-            AlphaMode::Opaque => 1.0,
-            AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
-            AlphaMode::Blend => alpha.clamp(0.0, 1.0),
-        }
-    }
-}
-
 /// Corners of a triangle and their weights at a point.
 #[derive(Clone, Copy)]
 struct Corners {
@@ -299,6 +151,37 @@ impl Corners {
     }
 }
 
+/// The plane of a triangle as it is seen at a point.
+struct Plane {
+    /// Corner 0.
+    first: Vec3,
+    edges: [Vec3; 2],
+    /// Unit normal, or zero.
+    outward: Vec3,
+    front: bool,
+    /// Area of the pixel's footprint over the doubled area of the triangle.
+    share: f32,
+}
+
+impl Plane {
+    #[inline]
+    fn new(geometry: &FrameGeometry, point: &SurfacePoint) -> Self {
+        let positions = geometry.indices[point.prim as usize].map(|i| geometry.position(i));
+        let edges = [positions[1] - positions[0], positions[2] - positions[0]];
+        let plane = edges[0].as_dvec3().cross(edges[1].as_dvec3());
+        let outward = plane.normalize_or_zero().as_vec3();
+        let cos = outward.dot(point.view);
+        let pixel = point.footprint / cos.abs().max(1e-3);
+        Self {
+            first: positions[0],
+            edges,
+            outward,
+            front: cos >= 0.0,
+            share: pixel * pixel / plane.length() as f32,
+        }
+    }
+}
+
 /// Texture coordinates of a point in one set.
 #[derive(Clone, Copy, Default)]
 struct Coordinates {
@@ -324,7 +207,7 @@ impl Coordinates {
 }
 
 /// Texture lookups at one point.
-struct Lookup<'a> {
+pub(super) struct Lookup<'a> {
     textures: &'a Textures<'a>,
     sets: [Coordinates; 2],
 }
@@ -346,7 +229,7 @@ impl Lookup<'_> {
 
     /// The texel, or `None` without a texture.
     #[inline]
-    fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
+    pub(super) fn get(&self, texture: &Option<Texture>) -> Option<Vec4> {
         let texture = texture.as_ref()?;
         let set = self.set(texture);
         Some(self.textures.sample(texture, set.at, texture.level_of(set.area)))
@@ -373,6 +256,16 @@ impl<'s> Shader<'s> {
             .map(|m| ShaderMaterial::new(m, scene, &textures))
             .collect();
         Self { materials, textures }
+    }
+
+    /// The materials of the scene, in its order.
+    pub fn materials(&self) -> &[ShaderMaterial] {
+        &self.materials
+    }
+
+    /// The images that these use.
+    pub fn textures(&self) -> &Textures<'s> {
+        &self.textures
     }
 
     /// Share of light that a surface lets through at a point: what the alpha of [`Self::surface`] leaves, for a
@@ -419,21 +312,15 @@ impl<'s> Shader<'s> {
     pub fn surface(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> Surface {
         let material = self.material(geometry, point.object);
         let corners = Corners::new(geometry, point.prim, point.u, point.v);
-        let positions = geometry.indices[point.prim as usize].map(|i| geometry.position(i));
-        let edges = [positions[1] - positions[0], positions[2] - positions[0]];
-        let plane = edges[0].as_dvec3().cross(edges[1].as_dvec3());
-        let outward = plane.normalize_or_zero().as_vec3();
-        let cos = outward.dot(point.view);
-        let front = cos >= 0.0;
+        let Plane {
+            first,
+            edges,
+            outward,
+            front,
+            share,
+        } = Plane::new(geometry, point);
         let geometric_normal = if front { outward } else { -outward };
-
-        let pixel = point.footprint / cos.abs().max(1e-3);
-        let lookup = self.lookup(
-            geometry,
-            &corners,
-            material,
-            pixel * pixel / plane.length() as f32,
-        );
+        let lookup = self.lookup(geometry, &corners, material, share);
         let base = base_color(geometry, &corners, material, &lookup);
         let arm = lookup
             .get(&material.metallic_roughness_texture)
@@ -476,12 +363,12 @@ impl<'s> Shader<'s> {
             })
         });
         Surface {
-            position: positions[0] + edges[0] * point.u + edges[1] * point.v,
+            position: first + edges[0] * point.u + edges[1] * point.v,
             geometric_normal,
             normal: shading,
             view: point.view,
             base_color: base.xyz(),
-            alpha: self.coverage(geometry, &corners, material, base.w),
+            alpha: self.covered(geometry, &corners, material, base.w),
             metallic: (material.metallic * arm.z).clamp(0.0, 1.0),
             roughness: (material.roughness * arm.y).clamp(0.0, 1.0),
             f0: (material.ior_reflectance * material.specular_color * specular_color).min(Vec3::ONE),
@@ -497,6 +384,16 @@ impl<'s> Shader<'s> {
             finish: finish.unwrap_or(SurfaceFinish::NONE),
             coat: coat(&material.coat, &lookup, [point.view, geometric_normal], normal),
         }
+    }
+
+    /// The alpha of [`Self::surface`] alone.
+    pub fn coverage(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> f32 {
+        let material = self.material(geometry, point.object);
+        let corners = Corners::new(geometry, point.prim, point.u, point.v);
+        let share = Plane::new(geometry, point).share;
+        let lookup = self.lookup(geometry, &corners, material, share);
+        let filtered = base_color(geometry, &corners, material, &lookup).w;
+        self.covered(geometry, &corners, material, filtered)
     }
 
     /// The surface of a solid where a ray crosses it. A solid has a volume, whatever the thickness of its material, and no
@@ -539,7 +436,7 @@ impl<'s> Shader<'s> {
 
     /// Coverage at a point where the filtered alpha is this.
     #[inline]
-    fn coverage(
+    fn covered(
         &self,
         geometry: &FrameGeometry,
         corners: &Corners,

@@ -14,21 +14,23 @@ use glam::{Vec2, Vec4};
 use rayon::prelude::*;
 use rayward_scene::{Sampler, Scene, TextureRef, Wrap};
 
-pub use pyramid::Encoding;
-use pyramid::{Level, Pyramid};
+pub use pyramid::{Encoding, Level, Pyramid};
 
 /// One use of an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture {
-    pyramid: usize,
-    sampler: Sampler,
+    /// Index of its pyramid.
+    pub pyramid: usize,
+    /// Wrapping and filtering.
+    pub sampler: Sampler,
     /// Texture coordinate set, 0 or 1.
     pub uv_set: u8,
     /// Columns of the linear part of the texture transform.
-    columns: [Vec2; 2],
-    offset: Vec2,
+    pub columns: [Vec2; 2],
+    /// Its offset.
+    pub offset: Vec2,
     /// Half the binary logarithm of texels per unit of texture coordinate area.
-    density: f32,
+    pub density: f32,
 }
 
 impl Texture {
@@ -93,6 +95,11 @@ impl<'s> Textures<'s> {
             .map(|u| Pyramid::new(u.image, &scene.images[u.image], u.encoding, u.mipmaps))
             .collect();
         Self { pyramids }
+    }
+
+    /// The pyramids, as [`Texture::pyramid`] counts them.
+    pub fn pyramids(&self) -> &[Pyramid<'s>] {
+        &self.pyramids
     }
 
     /// The texture of one reference; `None` if its image is missing or the reference was not among those given

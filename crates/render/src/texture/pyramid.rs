@@ -22,19 +22,24 @@ pub enum Encoding {
 
 /// One level of a pyramid.
 #[derive(Clone, Debug)]
-pub(super) struct Level<'s> {
-    pub(super) width: u32,
-    pub(super) height: u32,
-    texels: Cow<'s, [[u8; 4]]>,
+pub struct Level<'s> {
+    /// Texels of a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The texels in the image's own encoding, row by row.
+    pub texels: Cow<'s, [[u8; 4]]>,
 }
 
 /// An image and, if asked for, its smaller versions down to one texel.
 #[derive(Clone, Debug)]
-pub(super) struct Pyramid<'s> {
+pub struct Pyramid<'s> {
     /// Index of the image in the scene.
-    pub(super) image: usize,
-    pub(super) encoding: Encoding,
-    pub(super) levels: Vec<Level<'s>>,
+    pub image: usize,
+    /// What its bytes mean.
+    pub encoding: Encoding,
+    /// The image first, if asked for all others down to one texel.
+    pub levels: Vec<Level<'s>>,
     /// Value of each byte of a colour.
     decode: &'static [f32; 256],
 }

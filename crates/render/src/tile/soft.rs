@@ -8,11 +8,11 @@ use glam::{DVec3, Vec3};
 use rayward_trace::{AreaLight, Light, Receiver, Samples, Tile, exact};
 
 use super::{TileShader, TileWork};
-use crate::RenderOptions;
 use crate::geometry::triangles;
 use crate::secondary::SecondaryTracer;
-use crate::shade::{direct, direct_beside};
+use crate::shade::{Beam, LightRays, Source, direct, direct_beside, reaches_from};
 use crate::structures::LightShadows;
+use crate::{RenderOptions, Surface};
 
 /// The samples of a light: each light, and each sample of the pixels, has sets of its own.
 pub(crate) fn samples(options: &RenderOptions, light: usize, sample: u32) -> Samples {
@@ -119,7 +119,8 @@ impl TileShader<'_> {
                 continue;
             }
             let (receiver, pixel) = (work.receivers[n], work.pixels[n]);
-            let surface = &work.points[i as usize].surface;
+            let surface = work.points[i as usize].surface;
+            let surface = &surface;
             let rays = self.light_rays(surface, 0, 1.0);
             let certain = area.side(triangles(self.geometry).corners(receiver.prim)) != 0.0;
             let mut sum = Vec3::ZERO;
@@ -130,6 +131,8 @@ impl TileShader<'_> {
                 }
                 let sent = if self.options.paper {
                     Some(radiance)
+                } else if self.shading.is_some() {
+                    reaches_from(surface, &self.lights[light], area, &end).then_some(Vec3::ONE)
                 } else {
                     let incident = direct_beside(surface, &self.lights[light], area, &end, &rays);
                     incident.map(|incident| incident.radiance)
@@ -141,10 +144,39 @@ impl TileShader<'_> {
                         Some(all) => self.transmittance(all, &receiver, &end, &mut work.filters),
                         None => Vec3::ONE,
                     };
-                    sum += sent * passed;
+                    if self.shading.is_some() {
+                        work.together.beams.push(Beam {
+                            surface: i,
+                            share: passed * share,
+                            source: self.sample_source(light, area, end, surface, &rays),
+                        });
+                    } else {
+                        sum += sent * passed;
+                    }
                 }
             }
             work.points[i as usize].color += sum * share;
+        }
+    }
+
+    /// A sample of a light as where light comes from.
+    pub(crate) fn sample_source(
+        &self,
+        light: usize,
+        area: &AreaLight,
+        end: Light,
+        surface: &Surface,
+        rays: &LightRays,
+    ) -> Source {
+        let towards = match end {
+            Light::Point(position) => position - surface.position,
+            Light::Directional(direction) => direction,
+        };
+        Source::Sample {
+            light: light as u32,
+            end,
+            density: rays.density(area, surface.position, towards.normalize_or_zero()),
+            drawn: rays.drawn,
         }
     }
 

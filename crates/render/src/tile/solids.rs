@@ -91,7 +91,7 @@ impl TileShader<'_> {
         bounce
             .arrivals
             .extend(on_solids().map(|point| self.arrival(tile, point)));
-        self.illuminate_arrivals(tracer, bounce);
+        self.illuminate_solid_arrivals(tracer, bounce);
         let lit: Vec<Vec3> = bounce.arrivals.iter().map(|arrival| arrival.color).collect();
         let on_solids = points.iter_mut().filter(|point| point.on.is_some());
         for (point, color) in on_solids.zip(lit) {
