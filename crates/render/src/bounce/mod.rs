@@ -124,6 +124,9 @@ pub(crate) struct Arrival {
     diffused: bool,
     /// Whether the last ray of the path sees lights with a size.
     shows_lights: bool,
+    /// Density of that ray, and directions drawn from the environment where it started.
+    density: f32,
+    drawn: f32,
     surface: Surface,
     receiver: Receiver,
     on: OnSolid,
@@ -259,6 +262,8 @@ impl TileShader<'_> {
             sharp: 1.0,
             diffused: false,
             shows_lights: false,
+            density: f32::INFINITY,
+            drawn: 0.0,
             surface: point.surface,
             receiver: point.receiver,
             on: point.on,
@@ -367,6 +372,8 @@ impl TileShader<'_> {
                 sharp: flight.sharp,
                 diffused: flight.diffused,
                 shows_lights: flight.shows_lights,
+                density: flight.density,
+                drawn: flight.drawn,
                 receiver,
                 on: None,
                 bounces: flight.bounces,
@@ -423,6 +430,8 @@ impl TileShader<'_> {
             sharp: flight.sharp,
             diffused: flight.diffused,
             shows_lights: flight.shows_lights,
+            density: flight.density,
+            drawn: flight.drawn,
             receiver: receiver.among_triangles(),
             on: receiver.on,
             bounces: flight.bounces,
@@ -525,6 +534,12 @@ impl TileShader<'_> {
             let Some(lobe) = draw(self.draw(arrival.path, purpose, k)) else {
                 continue;
             };
+            // Drawn directions see through a thin wall: what lies behind it is met as if the wall were not there.
+            let (density, drawn) = if purpose == TRANSMITTED && surface.thin {
+                (arrival.density, arrival.drawn)
+            } else {
+                (lobe.density * rays as f32, drawn)
+            };
             let weight = arrival.weight * lobe.weight;
             if weight.max_element() < FAINT {
                 continue;
@@ -548,7 +563,7 @@ impl TileShader<'_> {
                     dir: lobe.towards,
                 },
                 on: arrival.on,
-                density: lobe.density * rays as f32,
+                density,
                 drawn,
                 bounces: arrival.bounces + 1,
                 passed: 0,
