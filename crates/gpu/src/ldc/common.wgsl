@@ -34,8 +34,11 @@ const REACH: f32 = 0.00390625;
 const ULP: f32 = 5.9604645e-8;
 // Slopes of a sample without a plane.
 const NO_PLANE: u32 = 0x8080u;
-// Most entries of a cell that are put in order: Mesa's software driver leaves loops after some 65,000 rounds of a thread.
+// Mesa's software driver leaves all loops of eight or sixteen threads after some 65,000 rounds. So this many samples of a
+// texel and entries of a cell are put in order,
 const LONGEST: u32 = 1024u;
+// and a ray that takes more rounds is unsure.
+const MOST_ROUNDS: u32 = 4000u;
 // Three words a sample: triangle, depth, slopes. Packed two: triangle, and slopes below sixteen bits of depth.
 const SAMPLE: u32 = 3u;
 const PACKED: u32 = 2u;

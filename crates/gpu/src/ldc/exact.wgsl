@@ -14,6 +14,7 @@ fn seen(mailbox: ptr<function, vec4u>, prim: u32) -> bool {
 }
 
 fn answer(index: u32, ray: Ray) -> Found {
+    most_rounds = MOST_ROUNDS;
     let order = axis_order(ray.dir);
     var best = Best(Verdict(MISS, FAR, FAR), NONE, FAR);
     var mailbox = vec4u(NONE);
@@ -40,6 +41,9 @@ fn answer(index: u32, ray: Ray) -> Found {
             }
         }
         steps = w.steps;
+    }
+    if spent() {
+        best.verdict.state = UNSURE;
     }
     return told(best, steps, tests);
 }

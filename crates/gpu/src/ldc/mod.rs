@@ -9,7 +9,9 @@
 //! Layout: 4 bytes a texel, 12 a sample (id, depth, slopes; 8 with 16 bits of depth, once it is built), 16 a cell, 12 a triangle and 12 a vertex. The samples'
 //! 128 MiB binding allows 11 million of them; a scene that would have more gets a cube of half the resolution, a
 //! quarter and so on. Cost: a sweep costs what its samples do; a ray some hundred steps. Limits: resolution up to
-//! 2048, where f32 texel coordinates still resolve 1/8192 of a texel.
+//! 2048, where f32 texel coordinates still resolve 1/8192 of a texel. Texels of more than 1,024 samples are in no order, and
+//! exact rays that take more than 4,000 rounds are asked of the CPU: Mesa's software driver leaves a thread's loops after some
+//! 65,000, done or not.
 
 pub(crate) mod build;
 pub(crate) mod layout;

@@ -1,5 +1,6 @@
 // Each texel's samples by depth, then id; with centre coverage those of equal depth are left out but the first. With
-// conservative coverage what has no plane, and so may be met at any depth, comes before all others.
+// conservative coverage what has no plane, and so may be met at any depth, comes before all others. What is too long
+// stays as it is.
 
 @group(0) @binding(1) var<storage, read> starts: array<u32>;
 @group(0) @binding(2) var<storage, read_write> samples: array<u32>;
@@ -32,6 +33,9 @@ fn sort(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
     }
     let first = starts[texel];
     let count = starts[texel + 1u] - first;
+    if count > LONGEST {
+        return;
+    }
     shell_sort(first, count);
     if frame.conservative == 1u || count < 2u {
         return;

@@ -520,3 +520,36 @@ fn assert_answers_as_the_reference(cube: &Cube, mesh: &Mesh, depth: DepthFormat,
         );
     }
 }
+
+#[test]
+fn texels_too_long_to_be_put_in_order_are_answered_right() {
+    let Some(gpu) = gpu() else { return };
+    // Thousands of triangles behind each other, so that their texels have as many samples.
+    let mut numbers = Numbers(4);
+    let mut mesh = Mesh::default();
+    for _ in 0..12_000 {
+        let middle = numbers.point() * Vec3::new(0.1, 0.1, 1.0);
+        mesh.triangle([(); 3].map(|()| middle + numbers.point() * Vec3::new(0.2, 0.2, 0.0)));
+    }
+    let brute = BruteForce::new(mesh.triangles());
+    let cube = built(
+        &gpu,
+        &mesh,
+        &CubeOptions {
+            resolution: 32,
+            ..CubeOptions::default()
+        },
+    );
+    let rays: Vec<Ray> = (0..600)
+        .map(|i| {
+            let from = numbers.point() * Vec3::new(0.3, 0.3, 1.0);
+            let across = Vec3::new(numbers.next(), numbers.next(), numbers.next() * 0.1);
+            Ray::new(from, if i % 2 == 0 { Vec3::Z } else { across })
+        })
+        .collect();
+    let (hits, stats) = cube.closest(&rays, &brute).unwrap_or_else(|e| panic!("{e}"));
+    for (ray, hit) in rays.iter().zip(&hits) {
+        assert_eq!(*hit, brute.intersect(ray), "{ray:?}");
+    }
+    assert!(stats.unsure > 100, "{stats:?}");
+}

@@ -29,6 +29,14 @@ struct Walk {
     steps: vec3u,
 }
 
+// Rounds of loops that this thread has gone, and after how many it gives up.
+var<private> rounds: u32;
+var<private> most_rounds: u32 = NONE;
+
+fn spent() -> bool {
+    return rounds > most_rounds;
+}
+
 fn walk_start(ray: Ray, axis: u32, steps: vec3u) -> Walk {
     var w: Walk;
     w.axis = axis;
@@ -93,8 +101,9 @@ fn leave(w: ptr<function, Walk>) -> bool {
 // comes within `pad` of their depths.
 fn walk_next(w: ptr<function, Walk>, t_end: f32, pad: f32) -> bool {
     loop {
+        rounds += 1u;
         if (*w).done {
-            if (*w).exit > t_end || !leave(w) {
+            if spent() || (*w).exit > t_end || !leave(w) {
                 return false;
             }
             (*w).done = false;
@@ -178,8 +187,8 @@ fn slopes_of(packed: u32) -> vec2f {
 // How far a sample's plane departs from its depth over the texel: slopes are at most 1 either way.
 const PLANE_REACH: f32 = 1.015625;
 
-// The samples of the texel found that may count, those within reach of the ray's depths: samples are sorted. Where what
-// has no plane comes before all others, it counts at any depth.
+// The samples of the texel found that may count, those within reach of the ray's depths: samples are sorted, but for
+// very many. Where what has no plane comes before all others, it counts at any depth.
 struct Near {
     next: u32,
     // First of those that are sorted and not below the ray.
@@ -197,7 +206,12 @@ fn near_ray(w: Walk, reach: f32) -> Near {
     let low = min(depths.x, depths.y) - reach;
     var start = w.first;
     var end = w.last;
+    rounds += 1u;
+    if end - start > LONGEST {
+        return Near(start, start, FAR);
+    }
     while start < end {
+        rounds += 1u;
         let middle = (start + end) / 2u;
         let sample = sample_at(middle, w.axis);
         if sample.id != NONE && (!by_depth(sample) || sample.depth < low) {
@@ -212,7 +226,8 @@ fn near_ray(w: Walk, reach: f32) -> Near {
 // The next of them; its id is NONE if there is none.
 fn next_near(w: ptr<function, Walk>, near: ptr<function, Near>) -> Sample {
     let nothing = Sample(NONE, 0.0, 0u);
-    if (*near).next >= (*w).last {
+    rounds += 1u;
+    if spent() || (*near).next >= (*w).last {
         return nothing;
     }
     var sample = sample_at((*near).next, (*w).axis);
