@@ -12,9 +12,9 @@
 //!
 //! Layout: 4 bytes a texel; a frame takes 32 bytes a triangle and 12 to 72 a vertex. A surface is 160 bytes each way, a beam
 //! 64. Cost: two submissions a tile, and two more for each wave of rays from it. Limits: attributes of all vertices in one
-//! binding, 1.8 million vertices if they have all of them; 2^32 texels. Texture coordinates that are not finite show any texel.
-//! On the CPU remain: surfaces with a film, sheen or anisotropy and their light, surfaces of solids, directions and radiance of an environment, lights as mirrors show them, and frames
-//! with a lens or a shutter as a whole.
+//! binding, 1.8 million vertices if they have all of them; 2^32 texels; 32,768 beams of a surface. Texture coordinates that are not
+//! finite show any texel. On the CPU remain: surfaces with a film, sheen or anisotropy and their light, surfaces of solids,
+//! directions and radiance of an environment, lights as mirrors show them, and frames with a lens or a shutter as a whole.
 
 pub(crate) mod layout;
 mod rows;
@@ -40,6 +40,8 @@ use layout::{BeamRow, Level, Lit, Material, Row, Shading, Use};
 const BATCH: usize = 1 << 16;
 /// Beams of one.
 const BEAMS: usize = 1 << 18;
+/// Beams of one surface, which one thread adds up: Mesa's software driver leaves loops after some 65,000 rounds.
+const MOST_BEAMS: u32 = 1 << 15;
 
 /// What a device has shaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -232,9 +234,18 @@ impl FrameShading<'_> {
         Ok(made.iter().map(rows::surface).collect())
     }
 
-    /// As [`SurfaceShader::lit`], in parts that have a bounded number of beams, unless a single surface has more.
+    /// As [`SurfaceShader::lit`], in parts that have a bounded number of beams.
     fn light_of(&self, surfaces: &[Surface], beams: &[Beam]) -> Result<Vec<Vec3>> {
         let (beams, firsts) = rows::by_surface(beams, surfaces.len());
+        let most = firsts.windows(2).map(|ends| ends[1] - ends[0]).max();
+        if let Some(needed) = most.filter(|&most| most > MOST_BEAMS) {
+            return Err(Error::Limits {
+                adapter: self.gpu().adapter().name.clone(),
+                what: "the light of one surface, in beams,",
+                needed: needed.into(),
+                limit: MOST_BEAMS.into(),
+            });
+        }
         let mut sums = Vec::with_capacity(surfaces.len());
         while sums.len() < surfaces.len() {
             let first = sums.len();

@@ -505,8 +505,40 @@ fn nothing_is_an_answer_to_nothing_and_a_lost_device_says_so() {
     let points = &points(&geometry, 1)[..4];
     let surfaces = frame.surfaces(points).expect("a working device");
     assert_eq!(frame.lit(&surfaces, &[]), Some(vec![Vec3::ZERO; 4]));
+    let around = Beam {
+        surface: 2,
+        share: Vec3::ONE,
+        source: Source::Around {
+            radiance: Vec3::ONE,
+            traced: Traced::default(),
+        },
+    };
+    assert!(frame.lit(&surfaces, &vec![around; 1 << 15]).is_some());
     device.gpu().destroy();
     assert_eq!(frame.surfaces(points), None);
     assert!(matches!(shading.problem(), Some(Error::Lost { .. })));
     assert!(shading.build(&geometry, &[]).is_none());
+}
+
+#[test]
+fn more_light_than_a_thread_adds_up_is_left_to_the_cpu() {
+    let Some(device) = device() else { return };
+    let scene = scene();
+    let shader = Shader::new(&scene);
+    let shading = GpuShading::new(&device, &shader).expect("it fits");
+    let geometry = geometry(Some(9));
+    let mut numbers = Numbers(7);
+    let lights = shading_lights(&mut numbers);
+    let frame = shading.build(&geometry, &lights).expect("it fits");
+    let surfaces = [random_surface(&mut numbers, 0)];
+    let beam = Beam {
+        surface: 0,
+        share: Vec3::ONE,
+        source: Source::Light(0),
+    };
+    assert_eq!(frame.lit(&surfaces, &vec![beam; (1 << 15) + 1]), None);
+    assert!(matches!(
+        shading.problem(),
+        Some(Error::Limits { needed: 32_769, .. })
+    ));
 }
