@@ -121,13 +121,9 @@ fn camera(geometry: &FrameGeometry) -> (View, Light) {
     (camera.view(geometry), light)
 }
 
-/// The pixel at a point of the square from -1 to 1.
-fn pixel_at(at: [f32; 2]) -> [u32; 2] {
-    [0, 1].map(|i| ((at[i] + 1.0) * 0.5 * PIXELS[i] as f32) as u32)
-}
-
 /// The ray that a pixel sends on from the surface it sees, mirrored there.
-fn seen_mirrored(view: &View, triangles: Triangles, bvh: &Bvh, cube: &Ldc, [x, y]: [u32; 2]) -> Option<Ray> {
+fn seen_mirrored(view: &View, triangles: Triangles, bvh: &Bvh, cube: &Ldc, at: [f32; 2]) -> Option<Ray> {
+    let [x, y] = [0, 1].map(|i| ((at[i] + 1.0) * 0.5 * PIXELS[i] as f32) as u32);
     let pixel = view.pixel_ray(x, y);
     let eye = Ray::new(pixel.origin.as_vec3(), pixel.dir.as_vec3());
     let (prim, hit) = bvh.closest(&eye, &mut ())?;
@@ -155,7 +151,7 @@ fn rays(geometry: &FrameGeometry, bvh: &Bvh, cube: &Ldc, count: usize) -> Vec<Ra
                 0 => dir = Vec3::AXES[i / 6 % 3] * dir.x.signum(),
                 1 => dir[i / 6 % 3] = 0.0,
                 2 | 3 => {
-                    if let Some(ray) = seen_mirrored(&view, triangles, bvh, cube, pixel_at([dir.x, dir.y])) {
+                    if let Some(ray) = seen_mirrored(&view, triangles, bvh, cube, [dir.x, dir.y]) {
                         return ray;
                     }
                 }
@@ -409,7 +405,7 @@ fn report(name: &str, geometry: &FrameGeometry, resolution: u32, count: usize, g
     measure("exact", &|ray, steps| {
         exact.closest(ray, steps).map(|(prim, hit)| (prim, hit.t))
     });
-    fours(geometry, &bvh, &exact, count / 100);
+    fours(&exact, &rays);
     if let Some(gpu) = gpu {
         let few = Few::of(&rays, &truth, judge);
         on_gpu(gpu, triangles, &bvh, resolution, &few);
@@ -441,27 +437,26 @@ impl Steps for Fours {
     fn triangle(&mut self) {}
 }
 
-/// Counts over reflections of squares of two by two pixels.
-fn fours(geometry: &FrameGeometry, bvh: &Bvh, cube: &Ldc, squares: usize) {
-    let (triangles, (view, _)) = (rayward::triangles(geometry), camera(geometry));
-    let mut numbers = Numbers(2);
+/// Counts over some of the rays, each with three parallel ones beside it, a texel apart.
+fn fours(cube: &Ldc, rays: &[Ray]) {
     let (mut all, mut in_step) = (Fours::default(), 0);
-    for _ in 0..squares {
-        let at = numbers.point();
-        let [x, y] = pixel_at([at.x, at.y]);
+    for ray in rays.iter().step_by(11) {
+        let (right, up) = ray.dir.normalize().any_orthonormal_pair();
         let mut longest = 0;
-        for pixel in [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]] {
+        for beside in [Vec3::ZERO, right, up, right + up] {
             let before = all.places;
-            if let Some(ray) = seen_mirrored(&view, triangles, bvh, cube, pixel) {
-                cube.closest(&ray, &mut all);
-            }
+            let beside = Ray {
+                origin: ray.origin + beside * cube.texel_size() as f32,
+                ..*ray
+            };
+            cube.closest(&beside, &mut all);
             longest = longest.max(all.places - before);
         }
         in_step += 4 * longest;
     }
     let percent = |part: u64, whole: u64| part as f64 / whole.max(1) as f64 * 100.0;
     println!(
-        "  {:<24} of four lanes busy: {:.0} % with four layers at once, {:.0} % with four rays; {:.2} tests of layers a place",
+        "  {:<24} of four lanes busy: {:.0} % with four layers at once, {:.0} % with four rays; {:.2} layers tested a place",
         "",
         percent(all.layers, 4 * all.batches),
         percent(all.places, in_step),
