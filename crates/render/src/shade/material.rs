@@ -194,8 +194,9 @@ impl ShaderMaterial {
         self.finish.is_some()
     }
 
-    /// All its textures but those of a film, sheen and anisotropy, in a fixed order: base colour, metallic and roughness, normal, occlusion, emission, weight and colour
-    /// of the reflection, transmission, and the coat's share, roughness and normal.
+    /// All its textures but those of a film, sheen and anisotropy, in a fixed order: base colour, metallic and roughness,
+    /// normal, occlusion, emission, weight and colour of the reflection, transmission, and the coat's share, roughness and
+    /// normal.
     pub fn textures(&self) -> [Option<&Texture>; 11] {
         [
             &self.base_color_texture,

@@ -151,6 +151,10 @@ impl Corners {
     }
 }
 
+/// The footprint's share with which masks are looked up: the mean of a mask is no mask, leaves would vanish at a distance, and
+/// not be those that cast shadows.
+const UNFILTERED: f32 = 0.0;
+
 /// The plane of a triangle as it is seen at a point.
 struct Plane {
     /// Corner 0.
@@ -390,10 +394,24 @@ impl<'s> Shader<'s> {
     pub fn coverage(&self, geometry: &FrameGeometry, point: &SurfacePoint) -> f32 {
         let material = self.material(geometry, point.object);
         let corners = Corners::new(geometry, point.prim, point.u, point.v);
-        let share = Plane::new(geometry, point).share;
-        let lookup = self.lookup(geometry, &corners, material, share);
-        let filtered = base_color(geometry, &corners, material, &lookup).w;
-        self.covered(geometry, &corners, material, filtered)
+        let share = match material.alpha_mode {
+            AlphaMode::Mask { .. } => UNFILTERED,
+            _ => Plane::new(geometry, point).share,
+        };
+        self.covered_by(geometry, &corners, material, share)
+    }
+
+    /// Coverage by texels filtered over this share of the triangle.
+    #[inline]
+    fn covered_by(
+        &self,
+        geometry: &FrameGeometry,
+        corners: &Corners,
+        material: &ShaderMaterial,
+        share: f32,
+    ) -> f32 {
+        let lookup = self.lookup(geometry, corners, material, share);
+        material.coverage(base_color(geometry, corners, material, &lookup).w)
     }
 
     /// The surface of a solid where a ray crosses it. A solid has a volume, whatever the thickness of its material, and no
@@ -446,9 +464,7 @@ impl<'s> Shader<'s> {
         let AlphaMode::Mask { .. } = material.alpha_mode else {
             return material.coverage(filtered);
         };
-        // The mean of a mask is no mask: leaves would vanish at a distance, and not be those that cast shadows.
-        let sharp = self.lookup(geometry, corners, material, 0.0);
-        material.coverage(base_color(geometry, corners, material, &sharp).w)
+        self.covered_by(geometry, corners, material, UNFILTERED)
     }
 
     fn material(&self, geometry: &FrameGeometry, object: u32) -> &ShaderMaterial {
