@@ -10,7 +10,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use crate::clusters::{Cluster, Clusters};
+use crate::clusters::{CLUSTER, Cluster, Clusters};
 use crate::kernel::facing::{CORNERS, Facing, TRIANGLES, facing};
 use crate::kernel::lambert::{DARK, LambertFrame, LambertTile, lambert};
 use crate::view::{Arrangement, View};
@@ -28,7 +28,7 @@ pub struct Facets<'a> {
     level: SimdLevel,
     frame: LambertFrame,
     /// Per triangle the bits of the light's distance from its plane, or of the cosine for a directional light:
-    /// positive on the side that the eye sees. All ones until it is asked for.
+    /// positive on the side that the eye sees. All ones until it is asked for. The last is that of nothing.
     facets: Vec<AtomicU32>,
 }
 
@@ -71,7 +71,9 @@ impl<'a> Facets<'a> {
             },
             parallel,
         };
-        let facets = (0..triangles.len()).map(|_| AtomicU32::new(UNASKED)).collect();
+        let mut facets = vec![UNASKED; triangles.len() + 1];
+        facets[triangles.len()] = 0;
+        let facets = facets.into_iter().map(AtomicU32::new).collect();
         Self {
             triangles,
             clusters: None,
@@ -119,26 +121,33 @@ impl<'a> Facets<'a> {
                 vertices,
                 corners,
             }) => {
+                let mut places = [[0.0; 4]; CORNERS * CLUSTER];
+                for (place, &vertex) in places.iter_mut().zip(vertices) {
+                    *place = self.place(vertex);
+                }
                 for (prims, corners) in prims.chunks(TRIANGLES).zip(corners.chunks(TRIANGLES)) {
-                    let vertex = |lane: usize, corner: usize| vertices[usize::from(corners[lane][corner])];
-                    self.fill(prims, &vertex);
+                    self.fill(prims, &|lane, corner| places[usize::from(corners[lane][corner])]);
                 }
             }
             None => {
                 let vertices = self.triangles.indices[prim as usize];
-                self.fill(&[prim], &|_, corner| vertices[corner]);
+                self.fill(&[prim], &|_, corner| self.place(vertices[corner]));
             }
         }
     }
 
-    /// Finds the facets of up to sixteen triangles, of which `vertex` gives the corners.
     #[inline(always)]
-    fn fill(&self, prims: &[u32], vertex: &impl Fn(usize, usize) -> u32) {
-        let mut corners = [[[0.0; TRIANGLES]; 3]; CORNERS];
+    fn place(&self, vertex: u32) -> [f32; 4] {
+        self.triangles.vertex(vertex).extend(0.0).to_array()
+    }
+
+    /// Finds the facets of up to sixteen triangles, of which `place` gives the corners.
+    #[inline(always)]
+    fn fill(&self, prims: &[u32], place: &impl Fn(usize, usize) -> [f32; 4]) {
+        let mut corners = [[[0.0; 4]; TRIANGLES]; CORNERS];
         for lane in 0..prims.len().min(TRIANGLES) {
             for (number, corner) in corners.iter_mut().enumerate() {
-                let at = self.triangles.vertex(vertex(lane, number));
-                (corner[0][lane], corner[1][lane], corner[2][lane]) = (at.x, at.y, at.z);
+                corner[lane] = place(lane, number);
             }
         }
         let facets = facing(self.level, &self.facing, &corners);
@@ -161,8 +170,21 @@ impl<'a> Facets<'a> {
             corner,
             depth,
         };
-        let (block, facet) = (|column, row| hits.block(column, row), |prim| self.facet(prim));
-        lambert(self.level, &self.frame, &tile, block, facet, out);
+        let block = |column, row| hits.block(column, row);
+        let nothing = self.facets.len() - 1;
+        let known = |prim: u32| {
+            let bits = self.facets[(prim as usize).min(nothing)].load(Ordering::Relaxed);
+            (bits != UNASKED).then_some(f32::from_bits(bits))
+        };
+        let all = |prims: &[u32; BLOCK_LANES]| self.of_block(prims);
+        lambert(self.level, &self.frame, &tile, block, (known, all), out);
+    }
+
+    /// The facets of a block's triangles, 0 where there is none.
+    #[cold]
+    fn of_block(&self, prims: &[u32; BLOCK_LANES]) -> [f32; BLOCK_LANES] {
+        let exists = |prim: u32| (prim as usize) < self.triangles.len();
+        prims.map(|prim| if exists(prim) { self.facet(prim) } else { 0.0 })
     }
 }
 

@@ -146,6 +146,19 @@ impl View {
         (scale * reach + raster) * 2f64.powi(-49)
     }
 
+    /// How far, in raster units, a point moves at most that moves by one unit of its depth, or of length in a parallel view.
+    pub(crate) fn spread(&self) -> f64 {
+        let far = |middle: f64, size: u32, scale: f64| {
+            let farthest = middle.abs().max((f64::from(size) - middle).abs());
+            match self.arrangement {
+                Arrangement::Perspective => scale.abs() + farthest,
+                Arrangement::Parallel { .. } => scale.abs(),
+            }
+        };
+        let x = far(self.middle[0], self.width, self.scale_x);
+        x.max(far(self.middle[1], self.height, self.scale_y)) * 2.0
+    }
+
     /// The ray through raster point (x, y).
     #[inline]
     pub fn ray(&self, x: f64, y: f64) -> ViewRay {

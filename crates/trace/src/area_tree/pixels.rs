@@ -6,10 +6,9 @@
 use super::{AreaLightTree, AreaScratch, Asking, BATCHES, FAR_RECEIVER};
 use crate::kernel::LANES;
 use crate::kernel::askers::{Origin, PixelPoints, place_blocks};
-use crate::kernel::pixels::PixelPlane;
 use crate::receiver_grid::GatherWork;
 use crate::visibility::VisibleTile;
-use crate::{Light, Receiver, Samples, Tile, TileHits, View};
+use crate::{Receiver, Samples, Tile, TileHits, View};
 
 /// What the pixels of one of the eye's tiles see.
 #[derive(Clone, Copy, Debug)]
@@ -118,10 +117,8 @@ impl AreaLightTree<'_> {
         out.samples = samples.count() as usize;
         out.open.clear();
         out.open.resize(tile.prims.len() * out.samples, 0);
-        let center = view.center.as_dvec3();
-        let eye = Light::Point(view.center);
-        let plane = |prim, corners| asks(prim).then(|| PixelPlane::new(center, corners, [&eye; 2]).0);
-        out.work.find(view, &self.triangles, tile, plane, self.level);
+        let asks = |prim, []: [Option<bool>; 0]| asks(prim);
+        out.work.find((view, []), &self.triangles, tile, asks, self.level);
         let GatherWork { rays, t, asked, .. } = &out.work;
         let points = PixelPoints {
             rays,

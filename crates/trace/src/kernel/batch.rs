@@ -92,9 +92,9 @@ pub(super) fn corner_lanes<S: Simd, const N: usize>(
     [[ax, bx, cx], [ay, by, cy], [an, bn, cn]]
 }
 
-/// x and y from `origin`, and nearness, of sixteen vertices' words.
+/// The four words each of sixteen vertices, as lanes.
 #[inline(always)]
-fn vertex_lanes<S: Simd>(simd: S, words: &[[f32; 4]], origin: [f32; 2]) -> [f32x16<S>; 3] {
+pub(super) fn four_lanes<S: Simd>(simd: S, words: &[[f32; 4]]) -> [f32x16<S>; 4] {
     let words = words.as_flattened();
     let first = f32x16::from_slice(simd, &words[..LANES]);
     let second = f32x16::from_slice(simd, &words[LANES..2 * LANES]);
@@ -102,8 +102,15 @@ fn vertex_lanes<S: Simd>(simd: S, words: &[[f32; 4]], origin: [f32; 2]) -> [f32x
     let fourth = f32x16::from_slice(simd, &words[3 * LANES..]);
     let (even, odd) = first.deinterleave(second);
     let (even_high, odd_high) = third.deinterleave(fourth);
-    let (x, nearness) = even.deinterleave(even_high);
-    let (y, rests) = odd.deinterleave(odd_high);
+    let (first, third) = even.deinterleave(even_high);
+    let (second, fourth) = odd.deinterleave(odd_high);
+    [first, second, third, fourth]
+}
+
+/// x and y from `origin`, and nearness, of sixteen vertices' words.
+#[inline(always)]
+fn vertex_lanes<S: Simd>(simd: S, words: &[[f32; 4]], origin: [f32; 2]) -> [f32x16<S>; 3] {
+    let [x, y, nearness, rests] = four_lanes(simd, words);
     let [x_rest, y_rest] = unpack_rests(simd, rests);
     // The first difference is exact for vertices in or next to the tile.
     let x = (x - f32x16::splat(simd, origin[0])) + x_rest;

@@ -2,6 +2,8 @@
 
 use fearless_simd::{Simd, f32x16, f64x8, prelude::*};
 
+use glam::DVec3;
+
 use super::LANES;
 
 pub(super) type Three<S> = [f64x8<S>; 3];
@@ -20,6 +22,15 @@ pub(super) fn load<S: Simd>(simd: S, v: &[[f32; LANES]; 3], half: usize) -> Thre
 fn load_axis<S: Simd>(simd: S, v: &[f32; LANES], half: usize) -> f64x8<S> {
     let (low, high) = f32x16::from_slice(simd, v).widen();
     if half == 0 { low } else { high }
+}
+
+#[inline(always)]
+pub(super) fn splat3<S: Simd>(simd: S, v: DVec3) -> Three<S> {
+    [
+        f64x8::splat(simd, v.x),
+        f64x8::splat(simd, v.y),
+        f64x8::splat(simd, v.z),
+    ]
 }
 
 #[inline(always)]

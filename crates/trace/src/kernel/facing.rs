@@ -6,7 +6,8 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 
-use super::doubles::{Three, cross, dot, load, minus};
+use super::doubles::{Three, cross, dot, minus};
+use super::planes::{CornerLanes, widened};
 use super::{LANES, SimdLevel};
 use crate::Light;
 use crate::view::{Arrangement, View};
@@ -48,26 +49,22 @@ impl Facing {
     }
 }
 
-/// Of triangles given by the coordinates of their corners the light's distance from their planes, or the cosine of its
+/// Of triangles given by the coordinates of their corners, and a fourth word, the light's distance from their planes, or the cosine of its
 /// direction, positive on the side that the eye sees. 0 for triangles without area.
-pub(crate) fn facing(
-    level: SimdLevel,
-    facing: &Facing,
-    corners: &[[[f32; TRIANGLES]; 3]; CORNERS],
-) -> [f32; TRIANGLES] {
+pub(crate) fn facing(level: SimdLevel, facing: &Facing, corners: &CornerLanes) -> [f32; TRIANGLES] {
     dispatch!(level.0, simd => facing_impl(simd, facing, corners))
 }
 
 #[inline(always)]
-fn facing_impl<S: Simd>(
-    simd: S,
-    facing: &Facing,
-    corners: &[[[f32; TRIANGLES]; 3]; CORNERS],
-) -> [f32; TRIANGLES] {
-    let ([a, b, c], mut values) = (corners, [[0.0; HALF]; 2]);
+fn facing_impl<S: Simd>(simd: S, facing: &Facing, corners: &CornerLanes) -> [f32; TRIANGLES] {
+    let [a, b, c] = [
+        widened(simd, &corners[0]),
+        widened(simd, &corners[1]),
+        widened(simd, &corners[2]),
+    ];
+    let mut values = [[0.0; HALF]; 2];
     for (half, value) in values.iter_mut().enumerate() {
-        let (a, b, c) = (load(simd, a, half), load(simd, b, half), load(simd, c, half));
-        *value = facing_half(simd, facing, [a, b, c]).into();
+        *value = facing_half(simd, facing, [a[half], b[half], c[half]]).into();
     }
     std::array::from_fn(|lane| values[lane / HALF][lane % HALF] as f32)
 }

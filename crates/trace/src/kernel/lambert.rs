@@ -44,16 +44,19 @@ pub(crate) struct LambertTile {
 }
 
 /// Shades the blocks of a tile; `block` gives ids and nearness or depth of the one in a column and a row, `facet` a
-/// triangle's.
+/// triangle's, and 0 for [`NONE`], if it is known, and `find` those of a block of which one is not.
 pub(crate) fn lambert<'t>(
     level: SimdLevel,
     frame: &LambertFrame,
     tile: &LambertTile,
     block: impl Fn(u32, u32) -> (&'t [u32; LANES], &'t [f32; LANES]),
-    facet: impl Fn(u32) -> f32,
+    (facet, find): (
+        impl Fn(u32) -> Option<f32>,
+        impl Fn(&[u32; LANES]) -> [f32; LANES],
+    ),
     out: &mut [[u8; LANES]],
 ) {
-    dispatch!(level.0, simd => lambert_impl(simd, frame, tile, &block, &facet, out));
+    dispatch!(level.0, simd => lambert_impl(simd, frame, tile, &block, (&facet, &find), out));
 }
 
 #[inline(always)]
@@ -62,7 +65,10 @@ fn lambert_impl<'t, S: Simd>(
     frame: &LambertFrame,
     tile: &LambertTile,
     block: &impl Fn(u32, u32) -> (&'t [u32; LANES], &'t [f32; LANES]),
-    facet: &impl Fn(u32) -> f32,
+    (facet, find): (
+        &impl Fn(u32) -> Option<f32>,
+        &impl Fn(&[u32; LANES]) -> [f32; LANES],
+    ),
     out: &mut [[u8; LANES]],
 ) {
     // What pixels of a block add to its first pixel's ray.
@@ -76,8 +82,7 @@ fn lambert_impl<'t, S: Simd>(
             *out = [BACKGROUND; LANES];
             continue;
         }
-        let uniform = lanes.simd_eq(u32x16::splat(simd, prims[0])).all_true();
-        let facets = facets_of(prims, uniform, facet);
+        let facets = known_facets(prims, facet).unwrap_or_else(|| find(prims));
         let mut value = f32x16::from_slice(simd, &facets);
         if let Some(light) = frame.light {
             let corner = [tile.corner[0] + column * BLOCK, tile.corner[1] + row * BLOCK];
@@ -166,20 +171,16 @@ fn affine<S: Simd>(
     ]
 }
 
-/// One look-up for each triangle that successive pixels see.
+/// The facets of a block, if all are known. Neighbouring pixels change triangles in no order that a processor could
+/// foresee, so each is looked up.
 #[inline(always)]
-fn facets_of(prims: &[u32; LANES], uniform: bool, facet: &impl Fn(u32) -> f32) -> [f32; LANES] {
-    if uniform {
-        return [facet(prims[0]); LANES];
-    }
+fn known_facets(prims: &[u32; LANES], facet: &impl Fn(u32) -> Option<f32>) -> Option<[f32; LANES]> {
     let mut facets = [0.0; LANES];
-    let mut last = (NONE, 0.0);
+    let mut known = true;
     for lane in 0..LANES {
-        let prim = prims[lane];
-        if prim != last.0 {
-            last = (prim, if prim == NONE { 0.0 } else { facet(prim) });
-        }
-        facets[lane] = last.1;
+        let value = facet(prims[lane]);
+        known &= value.is_some();
+        facets[lane] = value.unwrap_or(0.0);
     }
-    facets
+    known.then_some(facets)
 }

@@ -23,6 +23,7 @@ pub(crate) mod light_points;
 pub(crate) mod light_tree;
 pub(crate) mod lines;
 pub(crate) mod pixels;
+pub(crate) mod planes;
 pub(crate) mod points;
 pub(crate) mod project;
 pub(crate) mod receivers;

@@ -2,17 +2,20 @@
 //!
 //! The hit parameter of a pixel on its triangle is computed in f64 lanes with the operations of
 //! [`crate::exact::attributes`] in its order and without fused multiply-adds, so the points are those of
-//! [`crate::Receiver::along`], bit for bit. Pixels whose sums cancel are reported, to be done one by one.
+//! [`crate::Receiver::along`], bit for bit. Pixels whose sums cancel are reported, to be done one by one. Where a light sees
+//! points is found in fewer operations, unless that could show ([`Quick`]).
 //!
-//! Cost: some 30 vector instructions for sixteen pixels and each of their triangles, and 100 to project them.
+//! Cost: some 30 vector instructions for sixteen pixels and each of their triangles, and 60 to project them.
 
 use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, mask32x16, mask64x8, prelude::*, u32x16};
-use glam::{DVec3, Vec3, Vec3Swizzles};
+use glam::DVec3;
 
-use super::project::project_half;
+use super::batch::Bits;
+use super::doubles::{Three, minus, splat3};
+use super::planes::PixelPlane;
+use super::project::project_relative;
 use super::tile::{BLOCK, NONE};
 use super::{LANES, SimdLevel, bits_of};
-use crate::Light;
 use crate::view::{Arrangement, View};
 
 /// Lanes of f64 in half a block: two rows of four pixels.
@@ -28,6 +31,8 @@ pub(crate) struct TileRays {
     columns: Vec<[[f64; HALF]; 3]>,
     /// Per half row of blocks: x, y and z of the two rows, four times each.
     rows: Vec<[[f64; HALF]; 3]>,
+    /// The same and `forward`.
+    ahead: Vec<[[f64; HALF]; 3]>,
 }
 
 impl TileRays {
@@ -59,6 +64,12 @@ impl TileRays {
                 view.up * ((cy - y) / view.scale_y)
             })
         }));
+        self.ahead.clone_from(&self.rows);
+        for ahead in &mut self.ahead {
+            for (axis, lanes) in ahead.iter_mut().enumerate() {
+                lanes.iter_mut().for_each(|lane| *lane += view.forward[axis]);
+            }
+        }
     }
 
     /// A bound on the coordinates of all starts.
@@ -112,66 +123,28 @@ impl TileRays {
     }
 }
 
-/// A generous bound on the relative error of a difference, 2^-46.
-const ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
-
-/// A triangle as eye rays from one center meet it.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct PixelPlane {
-    normal: DVec3,
-    /// Sums of which less than this share is left have cancelled.
-    doubt: DVec3,
-    /// Height of the triangle's plane over the center; not a number if it has cancelled.
-    height: f64,
-}
-
-impl PixelPlane {
-    /// The operations of [`crate::exact::attributes`]. Also tells on which sides of the triangle these two lie, as
-    /// [`crate::exact::side`] has it, where that is beyond doubt.
-    pub(crate) fn new(
-        center: DVec3,
-        [v0, v1, v2]: [Vec3; 3],
-        ends: [&Light; 2],
-    ) -> (Self, [Option<bool>; 2]) {
-        let (v0, v1, v2) = (v0.as_dvec3(), v1.as_dvec3(), v2.as_dvec3());
-        let (a0, edge1, edge2) = (v0 - center, v1 - v0, v2 - v0);
-        let normal = edge1.cross(edge2);
-        let height = a0.dot(normal);
-        let terms = edge1.yzx().abs() * edge2.zxy().abs() + edge1.zxy().abs() * edge2.yzx().abs();
-        let doubt = terms * (1.0 / (1u64 << 27) as f64);
-        let sound = height.abs() > doubt.dot(a0.abs());
-        let size = edge1.abs().max(edge2.abs()).max_element();
-        let front = |end: &Light| {
-            let (value, bound) = match *end {
-                Light::Point(position) => {
-                    let a = position.as_dvec3() - v0;
-                    // The exact side rounds differences of positions, each by 2^-53 of its size.
-                    let far = a.abs().max_element() + size;
-                    let rounding = far * far * (size + far * ROUNDING) * ROUNDING;
-                    (a.dot(normal), doubt.dot(a.abs()) + rounding)
-                }
-                Light::Directional(direction) => {
-                    let d = direction.as_dvec3();
-                    (d.dot(normal), doubt.dot(d.abs()))
-                }
-            };
-            (value.abs() > bound).then_some(value > 0.0)
-        };
-        let fronts = [front(ends[0]), front(ends[1])];
-        let plane = Self {
-            normal,
-            doubt,
-            height: if sound { height } else { f64::NAN },
-        };
-        (plane, fronts)
-    }
-
-    /// One whose every pixel is to be done by itself.
-    pub(crate) fn unsound(self) -> Self {
-        Self {
-            height: f64::NAN,
-            ..self
-        }
+impl TileRays {
+    /// The points at parameter `t` of perspective rays as seen from a light, of which the center of the rays is `center`
+    /// away. Not those of [`Self::points`] to the bit, for half the operations: see [`Quick`].
+    #[inline(always)]
+    fn seen_from<S: Simd>(
+        &self,
+        simd: S,
+        (block, half): (usize, usize),
+        center: Three<S>,
+        t: f64x8<S>,
+    ) -> Three<S> {
+        let stride = self.columns.len();
+        let [cx, cy, cz] = &self.columns[block % stride];
+        let [rx, ry, rz] = &self.ahead[block / stride * 2 + half];
+        let x = f64x8::from_slice(simd, cx) + f64x8::from_slice(simd, rx);
+        let y = f64x8::from_slice(simd, cy) + f64x8::from_slice(simd, ry);
+        let z = f64x8::from_slice(simd, cz) + f64x8::from_slice(simd, rz);
+        [
+            x.mul_add(t, center[0]),
+            y.mul_add(t, center[1]),
+            z.mul_add(t, center[2]),
+        ]
     }
 }
 
@@ -266,8 +239,8 @@ fn hit_parameters_impl<S: Simd>(
                     doubt,
                     height,
                 } = planes[span.plane as usize];
-                let steepness = x * splat(normal.x) + y * splat(normal.y) + z * splat(normal.z);
-                let least = splat(doubt.x) * ax + splat(doubt.y) * ay + splat(doubt.z) * az;
+                let steepness = x * splat(normal[0]) + y * splat(normal[1]) + z * splat(normal[2]);
+                let least = splat(doubt[0]) * ax + splat(doubt[1]) * ay + splat(doubt[2]) * az;
                 let value = splat(height) / steepness;
                 let pixels = mask64x8::from_bitmask(simd, u64::from(span.pixels >> shift) & 0xff);
                 let sound = steepness.abs().simd_gt(least) & value.simd_eq(value);
@@ -363,34 +336,110 @@ fn project_receivers_impl<S: Simd>(
     entries: &mut Vec<Entry>,
 ) {
     let Asking { rays, t, pixels, .. } = *asking;
+    let Some(first) = faces.views.first() else {
+        return;
+    };
+    let light = first.center.as_dvec3();
+    let quick = Quick::new(rays, faces);
     for (block, &asked) in pixels.iter().enumerate() {
         if asked == 0 {
             continue;
         }
         let (low, high) = t[block].split_at(HALF);
-        let halves = [
-            rays.points(simd, block, 0, f64x8::from_slice(simd, low)),
-            rays.points(simd, block, 1, f64x8::from_slice(simd, high)),
-        ];
+        let t = [f64x8::from_slice(simd, low), f64x8::from_slice(simd, high)];
+        let halves = if quick.any {
+            let center = splat3(simd, rays.center - light);
+            [
+                rays.seen_from(simd, (block, 0), center, t[0]),
+                rays.seen_from(simd, (block, 1), center, t[1]),
+            ]
+        } else {
+            exact_halves(simd, rays, light, block, t)
+        };
         let of_face = faces_of(simd, faces, &halves, u32::from(asked));
-        for (face, lanes) in of_face.into_iter().enumerate().filter(|f| f.1 != 0) {
+        for face in Bits(
+            of_face
+                .iter()
+                .rev()
+                .fold(0, |bits, &lanes| bits << 1 | u32::from(lanes != 0)),
+        ) {
+            let lanes = of_face[face];
             let view = &faces.views[face];
-            let projected = project_block(simd, view, &halves);
+            let mut projected = project_block(simd, view, &halves);
+            if !quick.suffices(simd, face, projected[2], lanes) {
+                projected = project_block(simd, view, &exact_halves(simd, rays, light, block, t));
+            }
             let place = (view, face as u32, block);
             sort_block(simd, asking, place, lanes, projected, points, entries);
         }
     }
 }
 
+/// The points of a block as seen from a light, rounded as [`crate::Receiver::along`] has them.
+#[inline(always)]
+fn exact_halves<S: Simd>(
+    simd: S,
+    rays: &TileRays,
+    light: DVec3,
+    block: usize,
+    t: [f64x8<S>; 2],
+) -> [Three<S>; 2] {
+    let light = splat3(simd, light);
+    [
+        minus(rays.points(simd, block, 0, t[0]), light),
+        minus(rays.points(simd, block, 1, t[1]), light),
+    ]
+}
+
+/// Bound on what receivers in a light's raster may be off by, in its units, for not being rounded as exact decisions round
+/// them: to be added to [`View::rounding`]. Far below what rounding to f32 does to them.
+pub(crate) const QUICK_ERROR: f64 = 1.0 / (1u64 << 20) as f64;
+
+/// Where points made by [`TileRays::seen_from`] are good enough to be projected. A few roundings of the coordinates of eye
+/// and light, at 2^-53 each, tell them from exact ones; seen from close by they grow with nearness.
+struct Quick {
+    /// Whether it may be tried.
+    any: bool,
+    /// For each face the nearness of the nearest point that may be projected.
+    nearest: [f32; 6],
+}
+
+impl Quick {
+    #[inline(always)]
+    fn new(rays: &TileRays, faces: &LightFaces) -> Self {
+        let mut nearest = [0.0; 6];
+        for (nearest, view) in nearest.iter_mut().zip(&faces.views) {
+            let coordinates = rays.center.abs().max_element() + view.center.as_dvec3().abs().max_element();
+            let allowed = QUICK_ERROR / view.spread() / 2f64.powi(-46);
+            let beside = f64::from(view.width) / view.scale_x + f64::from(view.height) / view.scale_y;
+            *nearest = match view.arrangement {
+                // Part of the error is in proportion to the distance of the point.
+                Arrangement::Perspective if allowed > 64.0 => (allowed * 0.5 / coordinates) as f32,
+                Arrangement::Parallel { reach } if allowed > coordinates + reach + beside => f32::INFINITY,
+                _ => 0.0,
+            };
+        }
+        let any = !rays.parallel && nearest.iter().any(|&n| n > 0.0);
+        Self { any, nearest }
+    }
+
+    /// Whether these points of a block are good enough in a face.
+    #[inline(always)]
+    fn suffices<S: Simd>(&self, simd: S, face: usize, nearness: f32x16<S>, lanes: u32) -> bool {
+        let close = nearness.abs().simd_le(f32x16::splat(simd, self.nearest[face]));
+        !self.any || lanes & !bits_of(simd, close) == 0
+    }
+}
+
 /// Which of the asked points lie in which view.
 #[inline(always)]
-fn faces_of<S: Simd>(simd: S, faces: &LightFaces, halves: &[[f64x8<S>; 3]; 2], asked: u32) -> [u32; 6] {
+fn faces_of<S: Simd>(simd: S, faces: &LightFaces, halves: &[Three<S>; 2], asked: u32) -> [u32; 6] {
     let mut of_face = [0; 6];
     match (&faces.cube, faces.views.first()) {
         (_, None) => (),
         (None, _) => of_face[0] = asked,
-        (Some(cube), Some(view)) => {
-            let of_cube = cube_faces(simd, view.center.as_dvec3(), halves);
+        (Some(cube), Some(_)) => {
+            let of_cube = cube_faces(simd, halves);
             for (face, lanes) in cube.iter().zip(of_cube) {
                 if let Some(face) = face {
                     of_face[*face as usize] = lanes & asked;
@@ -402,9 +451,9 @@ fn faces_of<S: Simd>(simd: S, faces: &LightFaces, halves: &[[f64x8<S>; 3]; 2], a
 }
 
 #[inline(always)]
-fn project_block<S: Simd>(simd: S, view: &View, halves: &[[f64x8<S>; 3]; 2]) -> [f32x16<S>; 3] {
-    let low = project_half(simd, view, halves[0]);
-    let high = project_half(simd, view, halves[1]);
+fn project_block<S: Simd>(simd: S, view: &View, halves: &[Three<S>; 2]) -> [f32x16<S>; 3] {
+    let low = project_relative(simd, view, halves[0]);
+    let high = project_relative(simd, view, halves[1]);
     [
         low[0].narrow(high[0]),
         low[1].narrow(high[1]),
@@ -415,11 +464,10 @@ fn project_block<S: Simd>(simd: S, view: &View, halves: &[[f64x8<S>; 3]; 2]) -> 
 /// Which points lie in which of a cube's faces: those whose axis is closest to the direction. Rounding at a seam does not
 /// matter, for neighbouring faces overlap.
 #[inline(always)]
-fn cube_faces<S: Simd>(simd: S, center: DVec3, halves: &[[f64x8<S>; 3]; 2]) -> [u32; 6] {
-    let [low, high] = halves;
-    let x = relative(simd, low[0], high[0], center.x);
-    let y = relative(simd, low[1], high[1], center.y);
-    let z = relative(simd, low[2], high[2], center.z);
+fn cube_faces<S: Simd>(simd: S, [low, high]: &[Three<S>; 2]) -> [u32; 6] {
+    let x = low[0].narrow(high[0]);
+    let y = low[1].narrow(high[1]);
+    let z = low[2].narrow(high[2]);
     let largest = x.abs().max(y.abs()).max(z.abs());
     let mut rest = u32::MAX >> (32 - LANES);
     let mut of_face = [0; 6];
@@ -438,12 +486,6 @@ fn cube_faces<S: Simd>(simd: S, center: DVec3, halves: &[[f64x8<S>; 3]; 2]) -> [
         rest &= !along;
     }
     of_face
-}
-
-#[inline(always)]
-fn relative<S: Simd>(simd: S, low: f64x8<S>, high: f64x8<S>, center: f64) -> f32x16<S> {
-    let center = f64x8::splat(simd, center);
-    (low - center).narrow(high - center)
 }
 
 #[inline(always)]

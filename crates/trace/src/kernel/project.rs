@@ -5,6 +5,7 @@
 
 use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, prelude::*};
 
+use super::doubles::{Three, minus, splat3};
 use super::{LANES, SimdLevel};
 use crate::Triangles;
 use crate::view::{Arrangement, View};
@@ -150,7 +151,12 @@ fn rest<S: Simd>(simd: S, rounded: f32x16<S>, low: f64x8<S>, high: f64x8<S>) -> 
 /// The dot product of sixteen vectors' halves with one.
 #[inline(always)]
 fn dot<S: Simd>(simd: S, a: [f64x8<S>; 3], axis: glam::DVec3) -> f64x8<S> {
-    a[0] * f64x8::splat(simd, axis.x) + a[1] * f64x8::splat(simd, axis.y) + a[2] * f64x8::splat(simd, axis.z)
+    let (x, y, z) = (
+        f64x8::splat(simd, axis.x),
+        f64x8::splat(simd, axis.y),
+        f64x8::splat(simd, axis.z),
+    );
+    a[0].mul_add(x, a[1].mul_add(y, a[2] * z))
 }
 
 /// The two rests that belong to x and y.
@@ -165,29 +171,29 @@ pub(crate) fn unpack_rests<S: Simd>(simd: S, rests: f32x16<S>) -> [f32x16<S>; 2]
 }
 
 #[inline(always)]
-pub(crate) fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
+fn project_half<S: Simd>(simd: S, view: &View, points: [f64x8<S>; 3]) -> [f64x8<S>; 3] {
+    project_relative(simd, view, minus(points, splat3(simd, view.center.as_dvec3())))
+}
+
+/// Raster x and y and nearness of eight points, given by what they differ from the view's center.
+#[inline(always)]
+pub(crate) fn project_relative<S: Simd>(simd: S, view: &View, a: Three<S>) -> [f64x8<S>; 3] {
     let splat = |v: f64| f64x8::splat(simd, v);
-    let center = view.center.as_dvec3();
-    let a = [
-        points[0] - splat(center.x),
-        points[1] - splat(center.y),
-        points[2] - splat(center.z),
-    ];
     let (along, above) = (dot(simd, a, view.right), dot(simd, a, view.up));
     let depth = dot(simd, a, view.forward);
     let [cx, cy] = view.middle;
+    let (along, above) = (along * splat(view.scale_x), above * splat(-view.scale_y));
     match view.arrangement {
         Arrangement::Perspective => {
             let inverse = splat(1.0) / depth;
-            let x = splat(cx) + along * splat(view.scale_x) * inverse;
-            let y = splat(cy) - above * splat(view.scale_y) * inverse;
+            let x = along.mul_add(inverse, splat(cx));
+            let y = above.mul_add(inverse, splat(cy));
             [x, y, inverse]
         }
         Arrangement::Parallel { reach } => {
-            let x = splat(cx) + along * splat(view.scale_x);
-            let y = splat(cy) - above * splat(view.scale_y);
             let ahead = depth.simd_gt(splat(0.0));
-            [x, y, ahead.select(splat(reach) - depth, splat(-1.0))]
+            let nearness = ahead.select(splat(reach) - depth, splat(-1.0));
+            [along + splat(cx), above + splat(cy), nearness]
         }
     }
 }

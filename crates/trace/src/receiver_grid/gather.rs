@@ -1,17 +1,16 @@
 //! The pixels of each of the eye's tiles as receivers in a light's raster.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use super::LightQuery;
 use crate::kernel::pixels::{
-    Asking, BlockPoints, Entry, LightFaces, PixelPlane, Span, TileRays, find_spans, hit_parameters,
-    project_receivers,
+    Asking, BlockPoints, Entry, LightFaces, Span, TileRays, find_spans, hit_parameters, project_receivers,
 };
+use crate::kernel::planes::{CornerLanes, PixelPlane, find_planes};
 use crate::kernel::{LANES, SimdLevel};
 use crate::view::{Arrangement, View};
 use crate::visibility::{Visibility, VisibleTile};
-use crate::{Triangles, exact};
+use crate::{Light, Triangles, exact};
 
 /// The receivers of some of the eye's tiles: a part of all.
 #[derive(Clone, Debug, Default)]
@@ -82,7 +81,7 @@ pub(crate) struct GatherWork {
     spans: Vec<Span>,
     /// The triangles seen in a tile, their corners and planes.
     prims: Vec<u32>,
-    corners: Vec<[Vec3; 3]>,
+    corners: Vec<CornerLanes>,
     planes: Vec<PixelPlane>,
     /// Whether each asks.
     asking: Vec<bool>,
@@ -114,8 +113,9 @@ pub(super) fn gather(
         part.asked.clear();
         work.entries.clear();
         for (i, tile) in tiles.iter().enumerate() {
-            let plane = |_, corners| query.plane(visibility.view(), corners);
-            work.find(visibility.view(), triangles, tile, plane, level);
+            let asks = |prim, sides| query.asks(triangles, prim, sides);
+            let ends = [&query.light, &query.eye];
+            work.find((visibility.view(), ends), triangles, tile, asks, level);
             let asking = Asking {
                 eye_tile: (index * size + i) as u32,
                 part: index as u16,
@@ -136,26 +136,27 @@ pub(super) fn gather(
 }
 
 impl GatherWork {
-    /// Finds the surface points of a tile's pixels whose triangle has a plane here, which it has if they ask.
-    pub(crate) fn find(
+    /// Finds the surface points of those pixels of a tile whose triangle `asks`, which is told whether these ends lie in
+    /// front of it, where that is beyond doubt.
+    pub(crate) fn find<const ENDS: usize>(
         &mut self,
-        view: &View,
+        (view, ends): (&View, [&Light; ENDS]),
         triangles: &Triangles,
         tile: &VisibleTile,
-        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
+        asks: impl Fn(u32, [Option<bool>; ENDS]) -> bool,
         level: SimdLevel,
     ) {
-        self.find_spans(view, triangles, tile, plane_of, level);
+        self.find_spans((view, ends), triangles, tile, asks, level);
         self.find_points(view, triangles, tile, level);
     }
 
     /// The pixels that see the same triangle, as far as they ask.
-    fn find_spans(
+    fn find_spans<const ENDS: usize>(
         &mut self,
-        view: &View,
+        (view, ends): (&View, [&Light; ENDS]),
         triangles: &Triangles,
         tile: &VisibleTile,
-        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
+        asks: impl Fn(u32, [Option<bool>; ENDS]) -> bool,
         level: SimdLevel,
     ) {
         self.prims.clear();
@@ -168,7 +169,7 @@ impl GatherWork {
             })
         };
         find_spans(level, &tile.prims, &mut position_of, &mut self.spans);
-        self.find_planes(view, triangles, plane_of);
+        self.find_planes((view, ends), triangles, asks, level);
         self.asked.clear();
         self.asked.resize(tile.prims.len(), 0);
         let (asking, asked) = (&self.asking, &mut self.asked);
@@ -181,23 +182,37 @@ impl GatherWork {
 
     /// The planes of the triangles that are seen. Corners may lie anywhere in memory: they are read in a loop of its own,
     /// so that the processor waits for several at a time.
-    fn find_planes(
+    fn find_planes<const ENDS: usize>(
         &mut self,
-        view: &View,
+        (view, ends): (&View, [&Light; ENDS]),
         triangles: &Triangles,
-        plane_of: impl Fn(u32, [Vec3; 3]) -> Option<PixelPlane>,
+        asks: impl Fn(u32, [Option<bool>; ENDS]) -> bool,
+        level: SimdLevel,
     ) {
         let in_lanes = matches!(view.arrangement, Arrangement::Perspective);
-        self.corners.clear();
-        self.corners
-            .extend(self.prims.iter().map(|&prim| triangles.corners(prim)));
+        let batches = self.prims.len().div_ceil(LANES);
+        self.corners.resize(batches, [[[0.0; 4]; LANES]; 3]);
+        for (prims, corners) in self.prims.chunks(LANES).zip(&mut self.corners) {
+            for (lane, &prim) in prims.iter().enumerate() {
+                let [a, b, c] = triangles.corners(prim);
+                corners[0][lane] = a.extend(0.0).to_array();
+                corners[1][lane] = b.extend(0.0).to_array();
+                corners[2][lane] = c.extend(0.0).to_array();
+            }
+        }
         self.planes.clear();
         self.asking.clear();
-        for (&prim, &corners) in self.prims.iter().zip(&self.corners) {
-            let plane = plane_of(prim, corners);
-            self.asking.push(plane.is_some());
-            let plane = plane.unwrap_or_default();
-            self.planes.push(if in_lanes { plane } else { plane.unsound() });
+        for (prims, corners) in self.prims.chunks(LANES).zip(&self.corners) {
+            let (planes, sides) = find_planes(level, view.center.as_dvec3(), corners, ends);
+            self.planes.extend_from_slice(&planes);
+            let asking = prims.iter().enumerate().map(|(lane, &prim)| {
+                let sides = sides.map(|sides| sides.front(lane));
+                asks(prim, sides)
+            });
+            self.asking.extend(asking);
+        }
+        if !in_lanes {
+            self.planes.iter_mut().for_each(|plane| *plane = plane.unsound());
         }
     }
 

@@ -24,11 +24,10 @@ mod light_tile;
 
 use std::sync::atomic::AtomicU16;
 
-use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::kernel::SimdLevel;
-use crate::kernel::pixels::{BlockPoints, LIGHT_TILE, PixelPlane};
+use crate::kernel::pixels::{BlockPoints, LIGHT_TILE, QUICK_ERROR};
 use crate::kernel::receivers::Points;
 use crate::light_grid::takes_part;
 use crate::view::View;
@@ -246,15 +245,13 @@ impl LitPixels {
 }
 
 impl LightQuery<'_> {
-    /// The plane of a triangle whose pixels ask: it turns the side that they see to the light.
-    fn plane(&self, view: &View, corners: [Vec3; 3]) -> Option<PixelPlane> {
-        let ends = [&self.light, &self.eye];
-        let (plane, fronts) = PixelPlane::new(view.center.as_dvec3(), corners, ends);
-        let asks = match fronts {
+    /// Whether the pixels of a triangle ask: it turns the side that they see to the light. Of both is known in front of
+    /// which they lie, if it is beyond doubt.
+    fn asks(&self, triangles: &Triangles, prim: u32, fronts: [Option<bool>; 2]) -> bool {
+        match fronts {
             [Some(lit), Some(seen)] => lit == seen,
-            _ => exact::same_side(corners, &self.light, &self.eye),
-        };
-        asks.then_some(plane)
+            _ => self.faces(triangles, prim),
+        }
     }
 
     /// Whether the light is on the side of a triangle that the eye sees.
@@ -297,7 +294,7 @@ impl FaceScene<'_> {
             return 0;
         }
         let casters = self.find_casters(&farthest, chunks);
-        let rounding = self.view.rounding() as f32;
+        let rounding = (self.view.rounding() + QUICK_ERROR) as f32;
         let drawn: Vec<_> = asked
             .par_iter()
             .map_init(LightTileWork::default, |work, &tile| {

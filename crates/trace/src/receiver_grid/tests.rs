@@ -5,7 +5,8 @@ use rayon::prelude::*;
 
 use super::*;
 use crate::kernel::casters::{CasterLanes, LightRaster, sift_casters};
-use crate::test_meshes::{Mesh, axes, looking};
+use crate::kernel::pixels::{Asking, LightFaces, TileRays, project_receivers};
+use crate::test_meshes::{Mesh, Numbers, axes, looking};
 use crate::{Accel, BruteForce, Casts, EyeGrid, EyeGridOptions, Receiver};
 
 /// Every pixel of a view by brute force: `None` where nothing is seen, else the triangle and whether the light
@@ -366,4 +367,62 @@ fn sides_are_those_of_the_exact_decision() {
         }
     }
     assert!(known > 10_000 && known * 100 > all * 96, "{known} of {all}");
+}
+
+/// Points made in few operations are projected as if they had been rounded like those of the exact decision, or left to be
+/// made again.
+#[test]
+fn receivers_lie_where_their_rounded_points_do() {
+    let mut numbers = Numbers(8);
+    let size = 4 * LIGHT_TILE;
+    let mut seen = 0;
+    for (distance, scale) in [(3.0, 1.0), (1e3, 1.0), (1e3, 1e-4), (1e6, 1e-3), (1e6, 1e-5)] {
+        let eye = Vec3::new(0.2, 0.5, 0.9) * distance;
+        let view = looking(eye, Vec3::ZERO, f64::from(scale / distance), [32, 32]);
+        let light = Vec3::new(2.0, 3.0, 1.0) * scale;
+        let faces = LightFaces {
+            views: vec![looking(light, Vec3::ZERO, 0.6, [size; 2])],
+            cube: None,
+        };
+        let mut rays = TileRays::default();
+        rays.set(&view, [0, 0], [8, 8]);
+        let depth = eye.as_dvec3().length();
+        let mut lanes = || [(); 16].map(|()| depth + f64::from(numbers.next() * scale));
+        let (t, pixels): (Vec<_>, Vec<_>) = (0..64).map(|_| (lanes(), u16::MAX)).unzip();
+        let asking = Asking {
+            eye_tile: 0,
+            part: 0,
+            prims: &[[0; 16]; 64],
+            rays: &rays,
+            t: &t,
+            pixels: &pixels,
+        };
+        for level in SimdLevel::available() {
+            let (mut points, mut entries) = (Vec::new(), Vec::new());
+            project_receivers(level, &asking, &faces, &mut points, &mut entries);
+            for (entry, lane) in entries.iter().flat_map(|e| (0..16).map(move |lane| (e, lane))) {
+                if entry.lanes >> lane & 1 == 0 {
+                    continue;
+                }
+                seen += 1;
+                let at = &points[entry.points as usize];
+                let (block, lane) = (at.block, lane as u32);
+                let ray = view.pixel_ray(block % 8 * 4 + lane % 4, block / 8 * 4 + lane / 4);
+                let exact = Receiver::along(&ray, t[block as usize][lane as usize], 0).point;
+                let h = faces.views[0].homogeneous(exact);
+                let corner = [entry.light_tile % 4, entry.light_tile / 4].map(|i| f64::from(i * LIGHT_TILE));
+                for (found, want) in [
+                    (f64::from(at.x[lane as usize]) + corner[0], h.p.x / h.p.z),
+                    (f64::from(at.y[lane as usize]) + corner[1], h.p.y / h.p.z),
+                ] {
+                    let bound = f64::from(size) * 2f64.powi(-24) + QUICK_ERROR;
+                    assert!(
+                        (found - want).abs() < bound,
+                        "{found} {want}, {distance} from {scale}"
+                    );
+                }
+            }
+        }
+    }
+    assert!(seen > 3000, "{seen}");
 }
