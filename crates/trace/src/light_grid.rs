@@ -33,13 +33,13 @@ use crate::exact;
 use crate::eye_grid::project_all;
 use crate::kernel::edges::{EdgeLanes, EdgeRecord, VertexLanes};
 use crate::kernel::light_tree::Walk;
-use crate::kernel::points::{Caster, PointLanes, set_up_casters, shadowed};
+use crate::kernel::points::{Caster, PointLanes, RasterPlace, set_up_casters, shadowed};
 use crate::kernel::project::RasterVertex;
 use crate::kernel::veils::Veiled;
 use crate::kernel::{LANES, SimdLevel};
 use crate::light_costs::Extents;
 use crate::precise::PreciseTriangle;
-use crate::view::View;
+use crate::view::{Arrangement, View};
 use crate::{Light, Receiver, Topology, Triangles};
 use nearest::nearest_per_cell;
 use sheets::Sheets;
@@ -169,7 +169,7 @@ struct Pending {
     face: u32,
     cell: u32,
     receiver: u32,
-    raster: [f32; 3],
+    place: RasterPlace,
 }
 
 impl<'a> PointLightGrid<'a> {
@@ -272,12 +272,12 @@ impl<'a> PointLightGrid<'a> {
 
     /// What the cell that a receiver lies in holds; `None` if no caster can be before the receiver.
     pub fn cell_of(&self, receiver: &Receiver) -> Option<LightCell> {
-        let (face, raster) = locate(self.faces.iter().map(|face| &face.view), receiver.point)?;
+        let (face, place) = locate(self.faces.iter().map(|face| &face.view), receiver)?;
         let face = &self.faces[face];
-        let cell = face.cell(raster[0], raster[1]);
+        let cell = face.cell(place.x, place.y);
         Some(LightCell {
             casters: face.bins.cell(cell).map(<[u32]>::len).sum(),
-            spared: raster[2] >= face.nearest[cell] || face.hides(cell, raster),
+            spared: place.nearness >= face.nearest[cell] || face.hides(cell, &place),
         })
     }
 
@@ -293,16 +293,16 @@ impl<'a> PointLightGrid<'a> {
         scratch.counts.receivers += receivers.len() as u64;
         for (i, receiver) in receivers.iter().enumerate() {
             let views = self.faces.iter().map(|face| &face.view);
-            let Some((face, raster)) = locate(views, receiver.point) else {
+            let Some((face, place)) = locate(views, receiver) else {
                 continue;
             };
             let f = &self.faces[face];
-            let cell = f.cell(raster[0], raster[1]);
-            if raster[2] >= f.nearest[cell] {
+            let cell = f.cell(place.x, place.y);
+            if place.nearness >= f.nearest[cell] {
                 scratch.counts.lit_by_cell += 1;
                 continue;
             }
-            if f.hides(cell, raster) {
+            if f.hides(cell, &place) {
                 scratch.counts.dark_by_cell += 1;
                 is_dark(i);
                 continue;
@@ -312,7 +312,7 @@ impl<'a> PointLightGrid<'a> {
                 face,
                 cell,
                 receiver: i as u32,
-                raster,
+                place,
             });
         }
         scratch
@@ -329,10 +329,8 @@ impl<'a> PointLightGrid<'a> {
     ) {
         let face = &self.faces[batch[0].face as usize];
         for (lane, pending) in batch.iter().enumerate() {
-            scratch.points.x[lane] = pending.raster[0];
-            scratch.points.y[lane] = pending.raster[1];
-            scratch.points.nearness[lane] = pending.raster[2];
-            scratch.points.own[lane] = receivers[pending.receiver as usize].prim;
+            let own = receivers[pending.receiver as usize].prim;
+            scratch.points.set(lane, &pending.place, own);
         }
         let all = u32::MAX >> (32 - batch.len() as u32);
         let mut open = all;
@@ -417,13 +415,13 @@ impl Face {
 
     /// Whether what covers a point's cell whole lies before it.
     #[inline]
-    fn hides(&self, cell: usize, raster: [f32; 3]) -> bool {
-        self.dark.get(cell).is_some_and(|&dark| raster[2] < dark) && self.shows(raster)
+    fn hides(&self, cell: usize, place: &RasterPlace) -> bool {
+        self.dark.get(cell).is_some_and(|&dark| place.beyond < dark) && self.shows(place)
     }
 
     /// Whether a raster point lies within the raster, and not only next to it.
     #[inline]
-    fn shows(&self, [x, y, _]: [f32; 3]) -> bool {
+    fn shows(&self, &RasterPlace { x, y, .. }: &RasterPlace) -> bool {
         x >= 0.0 && y >= 0.0 && x <= self.view.width as f32 && y <= self.view.height as f32
     }
 
@@ -436,13 +434,13 @@ impl Face {
     }
 }
 
-/// Of a light's faces the one a point lies in, with its raster coordinates and nearness; `None` if no caster can be before
-/// it.
+/// Of a light's faces the one a receiver lies in, and where; `None` if no caster can be before it.
 #[inline]
 pub(crate) fn locate<'v>(
     views: impl Iterator<Item = &'v View> + Clone,
-    point: DVec3,
-) -> Option<(usize, [f32; 3])> {
+    receiver: &Receiver,
+) -> Option<(usize, RasterPlace)> {
+    let point = receiver.point;
     let depth = |view: &View| (point - view.center.as_dvec3()).dot(view.forward);
     // Of a cube's faces the one whose axis is closest; a single face is its own maximum.
     let best = |best: (usize, f64), next: (usize, f64)| if next.1 > best.1 { next } else { best };
@@ -453,14 +451,28 @@ pub(crate) fn locate<'v>(
     let view = views.clone().nth(face)?;
     let h = view.homogeneous(point);
     let inverse = 1.0 / h.p.z;
-    let raster = [
-        (h.p.x * inverse) as f32,
-        (h.p.y * inverse) as f32,
-        (h.m * inverse) as f32,
-    ];
+    let nearness = h.m * inverse;
+    let place = RasterPlace {
+        x: (h.p.x * inverse) as f32,
+        y: (h.p.y * inverse) as f32,
+        nearness: nearness as f32,
+        beyond: beyond(view, (along, nearness), receiver.error) as f32,
+    };
     let within = |v: f32, size: u32| v >= -1.0 && v <= size as f32 + 1.0;
-    let seen = within(raster[0], view.width) && within(raster[1], view.height);
-    seen.then_some((face, raster))
+    let seen = within(place.x, view.width) && within(place.y, view.height);
+    seen.then_some((face, place))
+}
+
+/// Nearness of what lies `error` before a point of that depth and nearness, at least that of the point itself. Written so that an
+/// error which is no number leaves nothing sure.
+#[inline]
+fn beyond(view: &View, (depth, nearness): (f64, f64), error: f64) -> f64 {
+    let beyond = match view.arrangement {
+        Arrangement::Perspective if depth > error => 1.0 / (depth - error),
+        Arrangement::Parallel { .. } if error < f64::INFINITY => nearness + error,
+        _ => f64::INFINITY,
+    };
+    beyond.max(nearness)
 }
 
 /// Largest number of cells in each direction of a face.

@@ -97,7 +97,7 @@ fn walk_impl<S: Simd>(
             walk.tests += u64::from(within.count_ones());
             walk.tested |= within;
             let caster = &casters[(child & !CASTER) as usize];
-            let left = open_past(simd, caster, (at, &points.own), within, &mut walk.unsure);
+            let left = open_past(simd, caster, (at, points), within, &mut walk.unsure);
             open &= left | !within;
         }
     }

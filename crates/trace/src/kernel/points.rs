@@ -16,12 +16,24 @@ pub(crate) struct Caster {
     pub(crate) origin: [f32; 2],
 }
 
+/// Where a receiver lies in a light's raster.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RasterPlace {
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) nearness: f32,
+    /// What is nearer than this is farther from the receiver than the receiver's error.
+    pub(crate) beyond: f32,
+}
+
 /// Up to sixteen points that share a cell.
 #[derive(Clone, Debug)]
 pub(crate) struct PointLanes {
     pub(crate) x: [f32; LANES],
     pub(crate) y: [f32; LANES],
     pub(crate) nearness: [f32; LANES],
+    /// What is nearer than this is beyond what each point may be off by.
+    beyond: [f32; LANES],
     /// The triangle each point lies on, which does not shadow it.
     pub(crate) own: [u32; LANES],
 }
@@ -32,8 +44,19 @@ impl Default for PointLanes {
             x: [0.0; LANES],
             y: [0.0; LANES],
             nearness: [0.0; LANES],
+            beyond: [0.0; LANES],
             own: [0; LANES],
         }
+    }
+}
+
+impl PointLanes {
+    /// Sets one of them, which lies on triangle `own`.
+    #[inline(always)]
+    pub(crate) fn set(&mut self, lane: usize, place: &RasterPlace, own: u32) {
+        (self.x[lane], self.y[lane]) = (place.x, place.y);
+        (self.nearness[lane], self.beyond[lane]) = (place.nearness, place.beyond);
+        self.own[lane] = own;
     }
 }
 
@@ -115,7 +138,7 @@ fn shadowed_impl<S: Simd>(
         f32x16::from_slice(simd, &points.nearness),
     ];
     for &r in refs {
-        open = open_past(simd, &casters[r as usize], (at, &points.own), open, unsure);
+        open = open_past(simd, &casters[r as usize], (at, points), open, unsure);
         if open == 0 {
             break;
         }
@@ -128,7 +151,7 @@ fn shadowed_impl<S: Simd>(
 pub(super) fn open_past<S: Simd>(
     simd: S,
     caster: &Caster,
-    (at, own): ([f32x16<S>; 3], &[u32; LANES]),
+    (at, points): ([f32x16<S>; 3], &PointLanes),
     open: u32,
     unsure: &mut Vec<(u32, u32)>,
 ) -> u32 {
@@ -147,9 +170,10 @@ pub(super) fn open_past<S: Simd>(
     if candidates == 0 {
         return open;
     }
-    let own = u32x16::from_slice(simd, own).simd_eq(u32x16::splat(simd, prim));
+    let own = u32x16::from_slice(simd, &points.own).simd_eq(u32x16::splat(simd, prim));
     candidates &= !(own.to_bitmask() as u32);
-    let sure = inside.simd_gt(splat(1.0)) & (n * splat(1.0 - NEARNESS_BAND)).simd_gt(at[2]) & !vague;
+    let beyond = f32x16::from_slice(simd, &points.beyond);
+    let sure = inside.simd_gt(splat(1.0)) & (n * splat(1.0 - NEARNESS_BAND)).simd_gt(beyond) & !vague;
     let sure = sure.to_bitmask() as u32 & candidates;
     let mut rest = candidates & !sure;
     while rest != 0 {

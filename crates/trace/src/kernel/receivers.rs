@@ -95,6 +95,8 @@ pub(crate) struct Points<'p> {
     /// Part by part of the eye's tiles.
     pub(crate) parts: &'p [&'p [BlockPoints]],
     pub(crate) tiles: &'p [VisibleTile],
+    /// Of nearer receivers than this it is not known that a caster lies farther from them than their error.
+    pub(crate) surest: f32,
 }
 
 impl Held {
@@ -436,7 +438,7 @@ fn draw_impl<S: Simd>(
     let top = tile.levels.len() - 1;
     let (mut at, mut left) = ([0; LEVELS], [0; LEVELS]);
     let mut level = top;
-    left[top] = tile.enter(simd, (top, 0), record, area, how);
+    left[top] = tile.enter(simd, (top, 0), record, area, how, points.surest);
     loop {
         if left[level] == 0 {
             if level == top {
@@ -452,7 +454,7 @@ fn draw_impl<S: Simd>(
         } else {
             level -= 1;
             at[level] = below;
-            left[level] = tile.enter(simd, (level, below), record, area, how);
+            left[level] = tile.enter(simd, (level, below), record, area, how, points.surest);
         }
     }
 }
@@ -467,11 +469,12 @@ impl ReceiverTile {
         record: &EdgeRecord,
         area: &CasterArea,
         (largest, may_cover): (Sides, bool),
+        surest: f32,
     ) -> u32 {
         let node = &self.nodes[self.levels[level] + index];
         let mut reached = reached_boxes(simd, node, record, area, largest) & node.asks;
         if may_cover && reached != 0 {
-            let covered = covered_boxes(simd, node, record, largest) & reached;
+            let covered = covered_boxes(simd, node, record, largest, surest) & reached;
             if covered != 0 {
                 reached &= !covered;
                 self.shut(level, index, covered);
@@ -555,9 +558,9 @@ fn largest_plane<S: Simd>(
     x + y
 }
 
-/// The boxes of a node that a caster certainly covers, before their nearest receiver.
+/// The boxes of a node that a caster certainly covers, before their nearest receiver, which is not nearer than `surest`.
 #[inline(always)]
-fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Sides) -> u32 {
+fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Sides, surest: f32) -> u32 {
     let [[ax, ay], [bx, by], [cx, cy]] = largest;
     let least_at = [[1 - ax, 1 - ay], [1 - bx, 1 - by], [1 - cx, 1 - cy]];
     // Twice what is certain for one receiver.
@@ -571,7 +574,8 @@ fn covered_boxes<S: Simd>(simd: S, node: &Node, record: &EdgeRecord, largest: Si
     let known: mask32x16<S> =
         least.simd_ge(f32x16::splat(simd, record.floor)) & most.simd_le(f32x16::splat(simd, record.ceiling));
     let nearer = least * f32x16::splat(simd, 1.0 - 2.0 * NEARNESS_BAND);
-    let nearer = nearer.simd_gt(f32x16::from_slice(simd, &node.nearest));
+    let nearest = f32x16::from_slice(simd, &node.nearest);
+    let nearer = nearer.simd_gt(nearest) & nearest.simd_le(f32x16::splat(simd, surest));
     bits_of(simd, covers & known & nearer)
 }
 
@@ -632,6 +636,7 @@ fn cover<S: Simd>(simd: S, block: &BlockPoints, points: Points, record: &EdgeRec
     let possible = covered & (farther.simd_ge(nearness) | vague);
     let nearer = n * f32x16::splat(simd, 1.0 - NEARNESS_BAND);
     let certain = inside.simd_gt(f32x16::splat(simd, 1.0)) & !vague;
+    let certain = certain & nearness.simd_le(f32x16::splat(simd, points.surest));
     let sure = possible & certain & nearer.simd_gt(nearness);
     (bits_of(simd, possible), bits_of(simd, sure))
 }

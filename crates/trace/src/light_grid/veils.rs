@@ -47,10 +47,8 @@ impl PointLightGrid<'_> {
             let face = &self.faces[same_cell[0].face as usize];
             for batch in same_cell.chunks(LANES) {
                 for (lane, pending) in batch.iter().enumerate() {
-                    points.x[lane] = pending.raster[0];
-                    points.y[lane] = pending.raster[1];
-                    points.nearness[lane] = pending.raster[2];
-                    points.own[lane] = receivers[pending.receiver as usize].prim;
+                    let own = receivers[pending.receiver as usize].prim;
+                    points.set(lane, &pending.place, own);
                 }
                 let mut open = u32::MAX >> (32 - batch.len() as u32);
                 let lists = face.bins.cell(batch[0].cell as usize);

@@ -140,7 +140,7 @@ impl<'a> PointLightTree<'a> {
         let mut waiting = Waiting::default();
         for (i, receiver) in receivers.iter().enumerate() {
             let views = self.faces.iter().map(|face| &face.view);
-            let Some((face, raster)) = locate(views, receiver.point) else {
+            let Some((face, place)) = locate(views, receiver) else {
                 continue;
             };
             if waiting.count == LANES || waiting.face != face {
@@ -148,10 +148,7 @@ impl<'a> PointLightTree<'a> {
                 waiting.face = face;
             }
             waiting.receivers[waiting.count] = i;
-            let points = &mut scratch.points;
-            (points.x[waiting.count], points.y[waiting.count]) = (raster[0], raster[1]);
-            points.nearness[waiting.count] = raster[2];
-            points.own[waiting.count] = receiver.prim;
+            scratch.points.set(waiting.count, &place, receiver.prim);
             waiting.count += 1;
         }
         self.test(&mut waiting, receivers, scratch, shadow);

@@ -26,11 +26,11 @@ use std::sync::atomic::AtomicU16;
 
 use rayon::prelude::*;
 
-use crate::kernel::SimdLevel;
 use crate::kernel::pixels::{BlockPoints, LIGHT_TILE, QUICK_ERROR};
 use crate::kernel::receivers::Points;
+use crate::kernel::{NEARNESS_BAND, SimdLevel};
 use crate::light_grid::takes_part;
-use crate::view::View;
+use crate::view::{Arrangement, View};
 use crate::visibility::place;
 use crate::{CastRule, Clusters, Cone, Light, Triangles, Visibility, exact};
 
@@ -143,6 +143,7 @@ impl LitPixels {
         let points = Points {
             parts: &points,
             tiles: visibility.tiles(),
+            surest: 0.0,
         };
         let lit: Vec<Vec<AtomicU16>> = parts
             .iter()
@@ -162,7 +163,10 @@ impl LitPixels {
                 triangles,
                 query,
                 parts,
-                points,
+                points: Points {
+                    surest: surest(visibility.view(), &faces.views[face]),
+                    ..points
+                },
                 lit: &lit,
                 view: &faces.views[face],
                 face: face as u32,
@@ -241,6 +245,30 @@ impl LitPixels {
                 ..LitCounts::default()
             },
         }
+    }
+}
+
+/// Up to which nearness to a light what the eye sees has errors ([`crate::Receiver::error`]) below a quarter of the band in which
+/// nearness is unsure.
+fn surest(eye: &View, light: &View) -> f32 {
+    let size = |view: &View| {
+        let across = f64::from(view.width) / view.scale_x + f64::from(view.height) / view.scale_y;
+        (f64::from(view.center.abs().max_element()), across)
+    };
+    let ((eye_center, across), (light_center, beside)) = (size(eye), size(light));
+    let start = match eye.arrangement {
+        Arrangement::Perspective => eye_center,
+        Arrangement::Parallel { .. } => eye_center + across,
+    };
+    // Starts, and ways from there to what lies not much farther from the light than its center.
+    let error = (2.0 * start + light_center) * 2f64.powi(-40);
+    let band = f64::from(NEARNESS_BAND) * 0.25;
+    match light.arrangement {
+        Arrangement::Perspective => (band / error) as f32,
+        Arrangement::Parallel { reach } if error + (reach + beside) * 2f64.powi(-40) < band * 0.5 * reach => {
+            f32::INFINITY
+        }
+        Arrangement::Parallel { .. } => 0.0,
     }
 }
 

@@ -96,8 +96,8 @@ fn lights() -> Vec<Light> {
 
 fn query(light: Light, view: &View, rule: CastRule<'static>) -> LightQuery<'static> {
     let eye = match view.arrangement {
-        crate::view::Arrangement::Perspective => Light::Point(view.center),
-        crate::view::Arrangement::Parallel { .. } => Light::Directional((-view.forward).as_vec3()),
+        Arrangement::Perspective => Light::Point(view.center),
+        Arrangement::Parallel { .. } => Light::Directional((-view.forward).as_vec3()),
     };
     LightQuery {
         light,
@@ -144,6 +144,23 @@ fn equals_brute_force_at_any_scale_and_offset() {
         let positions = [Vec3::new(2.0, 3.0, 1.0), Vec3::new(0.1, 0.1, 0.0)];
         let lights = positions.map(|p| Light::Point(p * scale + offset)).to_vec();
         check_lights(&format!("scale {scale} offset {offset}"), &mesh, view, lights);
+    }
+}
+
+/// Rounding of surface points is then as large as what tells shadows apart.
+#[test]
+fn an_eye_far_from_a_small_scene_and_its_light() {
+    for (distance, scale) in [(1e3, 1e-4), (1e5, 1e-3), (1e6, 1e-4), (1e6, 3e-6)] {
+        for (name, mesh) in [("soup", Mesh::soup(3, 400, 0.3, 1.0)), ("blob", Mesh::blob(24))] {
+            let mesh = mesh.scaled(scale, Vec3::ZERO);
+            let eye = Vec3::new(0.2, 0.5, 0.9) * distance;
+            let view = looking(eye, Vec3::ZERO, f64::from(scale / distance), [70, 45]);
+            let positions = [Vec3::new(2.0, 3.0, 1.0), Vec3::new(0.5, 0.7, 0.6)];
+            let lights = positions.map(|p| Light::Point(p * scale)).to_vec();
+            let [seen, lit, _, exact] = check_lights(name, &mesh, view, lights);
+            println!("{name}, {distance} from {scale}: {seen} seen, {lit} lit, {exact} exact pairs");
+            assert!(seen > 500 && lit > 50, "{seen} seen, {lit} lit");
+        }
     }
 }
 

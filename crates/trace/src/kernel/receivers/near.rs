@@ -101,7 +101,7 @@ pub(super) fn draw_near<S: Simd>(
         let mut reached = reached_boxes(simd, node, record, area, largest) & node.asks;
         let mut covered = 0;
         if side >= tile.mean_side && reached != 0 {
-            covered = covered_boxes(simd, node, record, largest) & reached;
+            covered = covered_boxes(simd, node, record, largest, points.surest) & reached;
         }
         while reached != 0 {
             let lane = reached.trailing_zeros();
