@@ -200,7 +200,7 @@ impl<'a> EyeGrid<'a> {
             "clusters of other triangles"
         );
         let grid = cells(&view, &options);
-        let lists = TileLists::build(&view, &triangles, clusters, &grid, options.binning);
+        let lists = TileLists::build((&view, level), &triangles, clusters, &grid, options.binning);
         let content = Content::Clusters { clusters, lists };
         Self::new(view, triangles, grid, content, options, level)
     }

@@ -259,7 +259,7 @@ fn draw_batch<S: Simd>(
 }
 
 /// Positions of the bits that are set.
-pub(super) struct Bits(pub(super) u32);
+pub(crate) struct Bits(pub(crate) u32);
 
 impl Iterator for Bits {
     type Item = usize;

@@ -37,13 +37,15 @@ impl<'v> LightRaster<'v> {
 /// The triangles of a cluster, in batches of sixteen.
 #[derive(Clone, Debug)]
 pub(crate) struct CasterLanes {
-    /// x, y and nearness.
-    vertices: [[[f32; LANES]; 3]; BATCHES * 3],
+    vertices: ClusterVertices,
     pub(crate) batches: [CasterBatch; BATCHES],
 }
 
+/// x, y and nearness of a cluster's vertices, sixteen each.
+pub(super) type ClusterVertices = [[[f32; LANES]; 3]; BATCHES * 3];
+
 /// Batches of a cluster.
-const BATCHES: usize = CLUSTER / LANES;
+pub(super) const BATCHES: usize = CLUSTER / LANES;
 
 /// Sixteen triangles.
 #[derive(Clone, Debug, Default)]
@@ -99,29 +101,45 @@ fn sift_casters_impl<S: Simd>(
     corners: &[[u8; 3]],
     out: &mut CasterLanes,
 ) {
-    for (points, out) in points.chunks_exact(3).zip(&mut out.vertices) {
+    project_cluster(simd, raster.view, points, &mut out.vertices);
+    for (corners, batch) in corners.chunks(LANES).zip(&mut out.batches) {
+        pick_corners(&out.vertices, corners, &mut batch.corners);
+        place(simd, raster, u32::MAX >> (32 - corners.len() as u32), batch);
+    }
+}
+
+/// Projects the vertices of a cluster.
+#[inline(always)]
+pub(super) fn project_cluster<S: Simd>(
+    simd: S,
+    view: &View,
+    points: &[[f32; LANES]],
+    vertices: &mut ClusterVertices,
+) {
+    for (points, out) in points.chunks_exact(3).zip(vertices) {
         let points = [
             f32x16::from_slice(simd, &points[0]),
             f32x16::from_slice(simd, &points[1]),
             f32x16::from_slice(simd, &points[2]),
         ];
-        let ([x, y, nearness], _) = project_lanes(simd, raster.view, points, [0.0; 2]);
+        let ([x, y, nearness], _) = project_lanes(simd, view, points, [0.0; 2]);
         x.store_slice(&mut out[0]);
         y.store_slice(&mut out[1]);
         nearness.store_slice(&mut out[2]);
     }
-    for (corners, batch) in corners.chunks(LANES).zip(&mut out.batches) {
-        let lanes = &mut batch.corners;
-        for (lane, numbers) in corners.iter().enumerate() {
-            for (corner, number) in numbers.iter().enumerate() {
-                let (block, at) = (*number as usize / LANES, *number as usize % LANES);
-                let [x, y, nearness] = &out.vertices[block];
-                lanes.x[corner][lane] = x[at];
-                lanes.y[corner][lane] = y[at];
-                lanes.nearness[corner][lane] = nearness[at];
-            }
+}
+
+/// The corners of up to sixteen triangles, given as numbers of vertices.
+#[inline(always)]
+pub(super) fn pick_corners(vertices: &ClusterVertices, corners: &[[u8; 3]], lanes: &mut VertexLanes) {
+    for (lane, numbers) in corners.iter().enumerate() {
+        for (corner, number) in numbers.iter().enumerate() {
+            let (block, at) = (*number as usize / LANES, *number as usize % LANES);
+            let [x, y, nearness] = &vertices[block];
+            lanes.x[corner][lane] = x[at];
+            lanes.y[corner][lane] = y[at];
+            lanes.nearness[corner][lane] = nearness[at];
         }
-        place(simd, raster, u32::MAX >> (32 - corners.len() as u32), batch);
     }
 }
 

@@ -82,14 +82,32 @@ fn lambert_impl<'t, S: Simd>(
             *out = [BACKGROUND; LANES];
             continue;
         }
-        let facets = known_facets(prims, facet).unwrap_or_else(|| find(prims));
-        let mut value = f32x16::from_slice(simd, &facets);
+        let uniform = lanes.simd_eq(u32x16::splat(simd, prims[0])).all_true();
+        let mut value = if uniform {
+            let facet = facet(prims[0]).unwrap_or_else(|| find(prims)[0]);
+            f32x16::splat(simd, facet)
+        } else {
+            let facets = known_facets(prims, facet).unwrap_or_else(|| find(prims));
+            f32x16::from_slice(simd, &facets)
+        };
         if let Some(light) = frame.light {
             let corner = [tile.corner[0] + column * BLOCK, tile.corner[1] + row * BLOCK];
             let dir = affine(simd, &frame.dir, &dir, corner);
-            let origin = affine(simd, &frame.origin, &origin, corner);
             let order = f32x16::from_slice(simd, order);
-            value = cosines(simd, frame, (light, tile.depth), [dir, origin], order, value);
+            value = if frame.parallel {
+                let origin = affine(simd, &frame.origin, &origin, corner);
+                let depth = if tile.depth {
+                    order
+                } else {
+                    f32x16::splat(simd, frame.reach) - order
+                };
+                cosines_at_depth(simd, light, [dir, origin], depth, value)
+            } else if tile.depth {
+                let origin = [f32x16::splat(simd, 0.0); 3];
+                cosines_at_depth(simd, light, [dir, origin], order, value)
+            } else {
+                cosines(simd, light, dir, order, value)
+            };
         }
         let zero = f32x16::splat(simd, 0.0);
         let light = value.max(zero).min(f32x16::splat(simd, 1.0));
@@ -102,39 +120,41 @@ fn lambert_impl<'t, S: Simd>(
     }
 }
 
-/// Cosines from facets. The light as seen from the points is scaled by nearness where that saves a reciprocal.
+/// Cosines from facets, of a perspective view: the light as seen from the points is scaled by nearness, which saves a
+/// reciprocal.
 #[inline(always)]
 fn cosines<S: Simd>(
     simd: S,
-    frame: &LambertFrame,
-    (light, depth): ([f32; 3], bool),
-    [dir, origin]: [[f32x16<S>; 3]; 2],
-    order: f32x16<S>,
+    light: [f32; 3],
+    dir: [f32x16<S>; 3],
+    nearness: f32x16<S>,
     facets: f32x16<S>,
 ) -> f32x16<S> {
     let light = splat3(simd, light);
     let mut squared = f32x16::splat(simd, f32::MIN_POSITIVE);
-    let scaled = !depth && !frame.parallel;
     for axis in 0..3 {
-        let offset = if scaled {
-            order * light[axis] - dir[axis]
-        } else {
-            let depth = if depth {
-                order
-            } else {
-                f32x16::splat(simd, frame.reach) - order
-            };
-            light[axis] - depth * dir[axis]
-        };
-        let offset = if frame.parallel {
-            offset - origin[axis]
-        } else {
-            offset
-        };
+        let offset = nearness * light[axis] - dir[axis];
         squared = offset.mul_add(offset, squared);
     }
-    let value = if scaled { facets * order } else { facets };
-    value / squared.sqrt()
+    facets * nearness / squared.sqrt()
+}
+
+/// Cosines from facets at points of known depth.
+#[inline(always)]
+fn cosines_at_depth<S: Simd>(
+    simd: S,
+    light: [f32; 3],
+    [dir, origin]: [[f32x16<S>; 3]; 2],
+    depth: f32x16<S>,
+    facets: f32x16<S>,
+) -> f32x16<S> {
+    let light = splat3(simd, light);
+    let mut squared = f32x16::splat(simd, f32::MIN_POSITIVE);
+    for axis in 0..3 {
+        let offset = light[axis] - depth * dir[axis] - origin[axis];
+        squared = offset.mul_add(offset, squared);
+    }
+    facets / squared.sqrt()
 }
 
 /// x and y of an affine function's slopes for the pixels of a block, counted from its corner.
@@ -171,8 +191,8 @@ fn affine<S: Simd>(
     ]
 }
 
-/// The facets of a block, if all are known. Neighbouring pixels change triangles in no order that a processor could
-/// foresee, so each is looked up.
+/// The facets of a block, if all are known. Its pixels change triangles in no order that a processor could foresee, so each is
+/// looked up.
 #[inline(always)]
 fn known_facets(prims: &[u32; LANES], facet: &impl Fn(u32) -> Option<f32>) -> Option<[f32; LANES]> {
     let mut facets = [0.0; LANES];

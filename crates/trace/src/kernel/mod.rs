@@ -27,6 +27,7 @@ pub(crate) mod planes;
 pub(crate) mod points;
 pub(crate) mod project;
 pub(crate) mod receivers;
+pub(crate) mod rects;
 pub(crate) mod shaft;
 pub(crate) mod tile;
 pub(crate) mod veils;
