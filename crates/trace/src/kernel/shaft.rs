@@ -366,8 +366,14 @@ pub(crate) struct Search {
     y: [f32; 2],
     /// Nearness of the farthest and of the nearest receiver.
     nearness: [f32; 2],
-    /// Smallest and largest sideways drift of rays per unit of nearness.
-    slopes: [[f32; 2]; 2],
+    /// Smallest and largest sideways drift of rays per unit of nearness, along x and y: what is below 0 of each, and above.
+    slopes: [[[f32; 2]; 2]; 2],
+}
+
+/// What is below 0 of the slopes along an axis, and above: one of the two is 0.
+#[inline(always)]
+fn parted([low, high]: [f32; 2]) -> [[f32; 2]; 2] {
+    [[low.min(0.0), low.max(0.0)], [high.min(0.0), high.max(0.0)]]
 }
 
 impl Search {
@@ -380,7 +386,7 @@ impl Search {
                 x,
                 y,
                 nearness: [reach - depth[1] - rounding, reach - depth[0] + rounding],
-                slopes: frame.half.map(|half| [-half, half]),
+                slopes: frame.half.map(|half| parted([-half, half])),
             };
         }
         let rounding = 2.0 * f32::EPSILON;
@@ -396,15 +402,16 @@ impl Search {
             y,
             nearness: [nearness(depth[1], -1.0), nearness(depth[0], 1.0)],
             slopes: [
-                Self::slopes(frame, frame.half[0], x, depth),
-                Self::slopes(frame, frame.half[1], y, depth),
+                parted(Self::slopes(frame, frame.half[0], x, depth)),
+                parted(Self::slopes(frame, frame.half[1], y, depth)),
             ],
         }
     }
 
     /// The same receivers, with slopes along x and y of some of their rays.
     #[inline(always)]
-    pub(crate) fn with_slopes(self, slopes: [[f32; 2]; 2]) -> Self {
+    pub(crate) fn with_slopes(self, [x, y]: [[f32; 2]; 2]) -> Self {
+        let slopes = [parted(x), parted(y)];
         Self { slopes, ..self }
     }
 
@@ -439,18 +446,12 @@ pub(crate) fn overlapped<S: Simd>(simd: S, boxes: &Boxes, batch: &Search) -> u32
     let [most, least] = lengths;
     let mut hit = nearer.simd_ge(splat(0.0));
     for (sides, range, [low, high]) in [
-        (&boxes.x, batch.x, batch.slopes[0]),
-        (&boxes.y, batch.y, batch.slopes[1]),
+        (&boxes.x, batch.x, &batch.slopes[0]),
+        (&boxes.y, batch.y, &batch.slopes[1]),
     ] {
         // One of the two products is 0.
-        let left = most.mul_add(
-            splat(low.min(0.0)),
-            least.mul_add(splat(low.max(0.0)), splat(range[0])),
-        );
-        let right = most.mul_add(
-            splat(high.max(0.0)),
-            least.mul_add(splat(high.min(0.0)), splat(range[1])),
-        );
+        let left = most.mul_add(splat(low[0]), least.mul_add(splat(low[1]), splat(range[0])));
+        let right = most.mul_add(splat(high[1]), least.mul_add(splat(high[0]), splat(range[1])));
         hit = hit
             & f32x16::from_slice(simd, &sides[0]).simd_le(right)
             & f32x16::from_slice(simd, &sides[1]).simd_ge(left);
