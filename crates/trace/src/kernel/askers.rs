@@ -8,9 +8,10 @@
 use fearless_simd::{Simd, dispatch, f32x16, f64x8, mask64x8, prelude::*};
 use glam::DVec3;
 
+use super::doubles::HALF;
 use super::light_points::Askers;
 use super::lines::{LightBox, ReceiverLanes};
-use super::pixels::{HALF, TileRays};
+use super::pixels::TileRays;
 use super::{LANES, SimdLevel, bits_of};
 
 /// What receivers are relative to.

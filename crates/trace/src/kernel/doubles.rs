@@ -6,6 +6,9 @@ use glam::DVec3;
 
 use super::LANES;
 
+/// Lanes of f64 in half of a batch.
+pub(super) const HALF: usize = LANES / 2;
+
 pub(super) type Three<S> = [f64x8<S>; 3];
 
 /// Half of three arrays of lanes: the lower one for 0.

@@ -6,7 +6,7 @@
 use fearless_simd::{Simd, dispatch, f64x8, prelude::*};
 use glam::DVec3;
 
-use super::doubles::{Three, cross, dot, minus};
+use super::doubles::{HALF, Three, cross, dot, minus};
 use super::planes::{CornerLanes, widened};
 use super::{LANES, SimdLevel};
 use crate::Light;
@@ -14,8 +14,6 @@ use crate::view::{Arrangement, View};
 
 /// Triangles done together.
 pub(crate) const TRIANGLES: usize = LANES;
-
-const HALF: usize = LANES / 2;
 
 /// Corners of each.
 pub(crate) const CORNERS: usize = 3;

@@ -9,11 +9,9 @@
 use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, prelude::*};
 use glam::DVec3;
 
-use super::doubles::{abs, cross, dot, load, minus, sum};
+use super::doubles::{HALF, abs, cross, dot, load, minus, sum};
 use super::shaft::FAR;
 use super::{LANES, SimdLevel, bits_of, max3, min3};
-
-const HALF: usize = LANES / 2;
 
 /// A frame and its light.
 #[derive(Clone, Copy, Debug)]

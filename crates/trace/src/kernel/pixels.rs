@@ -11,15 +11,12 @@ use fearless_simd::{Simd, dispatch, f32x16, f64x8, i32x16, mask32x16, mask64x8, 
 use glam::DVec3;
 
 use super::batch::Bits;
-use super::doubles::{Three, minus, splat3};
+use super::doubles::{HALF, Three, minus, splat3};
 use super::planes::PixelPlane;
 use super::project::project_relative;
 use super::tile::{BLOCK, NONE};
 use super::{LANES, SimdLevel, bits_of};
 use crate::view::{Arrangement, View};
-
-/// Lanes of f64 in half a block: two rows of four pixels.
-pub(super) const HALF: usize = LANES / 2;
 
 /// The eye rays of a tile, as sums of a part for the column and one for the row.
 #[derive(Clone, Debug, Default)]

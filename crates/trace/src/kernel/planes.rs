@@ -7,12 +7,9 @@ use fearless_simd::{Simd, dispatch, f64x8, mask64x8, prelude::*};
 use glam::DVec3;
 
 use super::batch::four_lanes;
-use super::doubles::{Three, abs, cross, dot, minus, splat3};
+use super::doubles::{HALF, Three, abs, cross, dot, minus, splat3};
 use super::{LANES, SimdLevel};
 use crate::Light;
-
-/// Lanes of f64 in half of sixteen.
-const HALF: usize = LANES / 2;
 
 /// A generous bound on the relative error of a difference, 2^-46.
 const ROUNDING: f64 = 1.0 / (1u64 << 46) as f64;
