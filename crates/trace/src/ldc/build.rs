@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use super::frame::{CubeFrame, Raster, TILE};
 use super::levels::{Cell, Hierarchy, Level, Texel, coarse_slots, slots};
 use super::raster::{Coverage, Fragment, Routed};
-use super::samples::{Depth, DepthFormat, Sample, Samples};
+use super::samples::{Depth, DepthFormat, Layers, Sample, Samples};
 use super::{LdcBuild, LdcOptions};
 use crate::{BuildStats, Triangles};
 
@@ -159,7 +159,7 @@ fn stack<D: Depth>(
     scale: f32,
     options: &LdcOptions,
     source: impl Fn(usize, &mut dyn FnMut(u32, Fragment)) + Sync,
-    wrap: impl Fn(Vec<Sample<D>>) -> Samples,
+    wrap: impl Fn(Layers<D>) -> Samples,
 ) -> Stack {
     let count = (raster.size[1] / TILE) as usize;
     let bands: Vec<Band> = (0..count)
@@ -173,7 +173,10 @@ fn stack<D: Depth>(
         })
         .collect();
     let total = bands.iter().map(|b| b.samples.len()).sum();
-    let (mut texels, mut samples) = (Vec::with_capacity(raster.texels() + 1), Vec::with_capacity(total));
+    let (mut texels, mut samples) = (
+        Vec::with_capacity(raster.texels() + 1),
+        Layers::with_capacity(total),
+    );
     let mut base = options.hierarchy.base().map(|shift| Level::empty(&raster, shift));
     let mut layers = 0;
     for (index, band) in bands.iter().enumerate() {
@@ -182,7 +185,9 @@ fn stack<D: Depth>(
             start: range[0] + offset,
             occupied: band.occupied(range, options.hierarchy, scale, D::error(scale)),
         }));
-        samples.extend(band.samples.iter().map(|(prim, f)| Sample::of(f, *prim, scale)));
+        for (prim, fragment) in &band.samples {
+            samples.push(Sample::of(fragment, *prim, scale));
+        }
         layers = band.starts.windows(2).map(|w| w[1] - w[0]).fold(layers, u32::max);
         if let Some(level) = &mut base {
             band.bound(level, index as u32, options.hierarchy, scale, D::error(scale));
@@ -196,7 +201,7 @@ fn stack<D: Depth>(
         raster,
         scale,
         texels,
-        samples: wrap(samples),
+        samples: wrap(samples.finished()),
         levels: options.hierarchy.complete(&raster, base),
         layers,
     }

@@ -89,7 +89,7 @@ impl Level {
 
     #[inline(always)]
     pub(crate) fn cell(&self, column: u32, row: u32) -> &Cell {
-        &self.cells[((row >> self.shift[1]) * self.columns + (column >> self.shift[0])) as usize]
+        &self.cells[(row * self.columns + column) as usize]
     }
 
     /// The level above, whose cells are 2^`by` of these cells wide and high.

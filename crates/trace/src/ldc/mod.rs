@@ -16,7 +16,7 @@
 //! A frame of an animation may have two of them, one of what has stood still so far and is kept ([`StillCube`]), one of
 //! what moves; a ray is followed through the one it enters first, and what it meets there shortens it for the other.
 //!
-//! Layout: 8 bytes a texel, 8 or 12 bytes a sample (`ldc/samples.rs`), 16 bytes a cell (`ldc/levels.rs`); texels in
+//! Layout: 8 bytes a texel, 8 or 10 bytes a sample (`ldc/samples.rs`), 16 bytes a cell (`ldc/levels.rs`); texels in
 //! tiles of 8 x 8. Limits: rays that start more than 2^36 texels away test every triangle; triangles much larger than
 //! the scene's rest leave all of that in few texels, which stays right but slow.
 
@@ -51,7 +51,7 @@ use crate::{Accel, BuildStats, Hit, Light, Ray, Receiver, Triangles};
 use build::Stack;
 use frame::widened;
 use raster::{NO_PLANE, REACH};
-use samples::{Depth, Sample, Samples};
+use samples::{Depth, Layers, Samples};
 use walk::{Reach, walk};
 
 /// How samples are made.
@@ -401,7 +401,7 @@ pub(crate) const PLANE_REACH: f32 = 1.0 + 1.0 / 64.0;
 #[inline(always)]
 fn crossed<D: Depth>(
     stack: &Stack,
-    samples: &[Sample<D>],
+    samples: &Layers<D>,
     ray: &TexelRay,
     t_end: &mut f64,
     steps: &mut impl Steps,
@@ -423,7 +423,7 @@ fn crossed<D: Depth>(
         reach,
         steps,
         |near, segment, t_end| {
-            for sample in near {
+            for sample in near.map(|index| samples.get(index)) {
                 let needle = sample.slopes == NO_PLANE;
                 let slopes = if needle { [0; 2] } else { sample.slopes };
                 let [a, b] = segment.above(sample.depth.texels(stack.scale), slopes);

@@ -16,7 +16,7 @@ use glam::Vec3;
 use super::build::Stack;
 use super::frame::{Clipped, TexelRay};
 use super::raster::NO_PLANE;
-use super::samples::{Depth, Sample, Samples};
+use super::samples::{Depth, Layers, Samples};
 use super::walk::{Reach, Segment, Steps, walk};
 use super::{Cube, Ldc, PLANE_REACH, axis_order};
 use crate::exact;
@@ -203,7 +203,7 @@ fn nearer(a: &(f64, u32), b: &(f64, u32)) -> bool {
 /// The first hit in one direction.
 fn in_stack<D: Depth>(
     stack: &Stack,
-    samples: &[Sample<D>],
+    samples: &Layers<D>,
     ray: &TexelRay,
     test: HitTest,
     range: [f64; 2],
@@ -223,7 +223,7 @@ fn in_stack<D: Depth>(
         test.reach(steepness),
         steps,
         |near, segment, t_end| {
-            for sample in near {
+            for sample in near.map(|index| samples.get(index)) {
                 let slopes = if sample.slopes == NO_PLANE {
                     [0; 2]
                 } else {

@@ -2,7 +2,9 @@
 //!
 //! A sample is the plane of one triangle over one texel: depth at the texel's centre, two slopes, the triangle's id.
 //! Normal, colour and material follow from the id when a hit is shaded, as VMV07 defers shading; the geometric normal
-//! also from the slopes. 12 bytes with f32 depth, 8 with u16 or f16.
+//! also from the slopes. 10 bytes with f32 depth, 8 with u16 or f16.
+
+use std::ops::Range;
 
 use half::f16;
 
@@ -101,13 +103,92 @@ pub struct TexelSample {
     pub slopes: Option<[i8; 2]>,
 }
 
+/// Depths that are compared together; so many follow the last sample's.
+const BLOCK: usize = 16;
+
+/// Samples by texel in memory order, then by depth: an array for each of what they hold, for of most of them only the
+/// depth is looked at.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Layers<D> {
+    depths: Vec<D>,
+    slopes: Vec<[i8; 2]>,
+    prims: Vec<u32>,
+}
+
+impl<D: Depth> Layers<D> {
+    pub(crate) fn with_capacity(samples: usize) -> Self {
+        Self {
+            depths: Vec::with_capacity(samples + BLOCK),
+            slopes: Vec::with_capacity(samples),
+            prims: Vec::with_capacity(samples),
+        }
+    }
+
+    pub(crate) fn push(&mut self, sample: Sample<D>) {
+        self.depths.push(sample.depth);
+        self.slopes.push(sample.slopes);
+        self.prims.push(sample.prim);
+    }
+
+    /// When all samples are there.
+    pub(crate) fn finished(mut self) -> Self {
+        self.depths.extend([D::stored(0.0, 1.0); BLOCK]);
+        self
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.prims.len()
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&self, index: usize) -> Sample<D> {
+        Sample {
+            prim: self.prims[index],
+            depth: self.depths[index],
+            slopes: self.slopes[index],
+        }
+    }
+
+    /// Those of a texel's samples whose depth is between two. Which ones come before is counted, sixteen at a time, without
+    /// a branch; longer lists are halved first.
+    #[inline(always)]
+    pub(crate) fn between(&self, list: Range<usize>, [low, high]: [f32; 2], scale: f32) -> Range<usize> {
+        let Range { start: mut from, end } = list;
+        let mut left = end - from;
+        while left > BLOCK {
+            let half = left / 2;
+            from += if self.depths[from + half - 1].texels(scale) < low {
+                half
+            } else {
+                0
+            };
+            left -= half;
+        }
+        let block: &[D; BLOCK] = self.depths[from..].first_chunk().expect("finished");
+        let mut before = 0;
+        for (i, depth) in block.iter().enumerate() {
+            before += usize::from((i < left) & (depth.texels(scale) < low));
+        }
+        from += before;
+        // These are few.
+        let beyond = self.depths[from..end]
+            .iter()
+            .position(|depth| depth.texels(scale) > high);
+        from..beyond.map_or(end, |count| from + count)
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&*self.depths) + size_of_val(&*self.slopes) + size_of_val(&*self.prims)
+    }
+}
+
 /// The samples of a direction with their texels.
-pub(crate) fn listed<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<TexelSample> {
+pub(crate) fn listed<D: Depth>(stack: &Stack, samples: &Layers<D>) -> Vec<TexelSample> {
     let mut all = Vec::with_capacity(samples.len());
     for (texel, range) in stack.texels.windows(2).enumerate() {
         all.extend(
-            samples[range[0].start as usize..range[1].start as usize]
-                .iter()
+            (range[0].start as usize..range[1].start as usize)
+                .map(|index| samples.get(index))
                 .map(|sample| TexelSample {
                     texel: texel as u32,
                     prim: sample.prim,
@@ -122,9 +203,9 @@ pub(crate) fn listed<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<Texe
 /// All samples of one direction.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Samples {
-    F16(Vec<Sample<f16>>),
-    U16(Vec<Sample<u16>>),
-    F32(Vec<Sample<f32>>),
+    F16(Layers<f16>),
+    U16(Layers<u16>),
+    F32(Layers<f32>),
 }
 
 impl Samples {
@@ -138,9 +219,9 @@ impl Samples {
 
     pub(crate) fn bytes(&self) -> usize {
         match self {
-            Self::F16(s) => size_of_val(&**s),
-            Self::U16(s) => size_of_val(&**s),
-            Self::F32(s) => size_of_val(&**s),
+            Self::F16(s) => s.bytes(),
+            Self::U16(s) => s.bytes(),
+            Self::F32(s) => s.bytes(),
         }
     }
 }

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::build::Stack;
 use super::levels::slots;
+use super::samples::Sample;
 use super::*;
 use crate::test_meshes::{Mesh, Numbers};
 
@@ -23,12 +24,12 @@ const CENTRE: LdcBuild = LdcBuild::Csr(Coverage::Centre);
 
 /// Prim, depth in texels and texel of all samples.
 fn listed(stack: &Stack) -> Vec<(u32, f32, usize)> {
-    fn list<D: Depth>(stack: &Stack, samples: &[Sample<D>]) -> Vec<(u32, f32, usize)> {
+    fn list<D: Depth>(stack: &Stack, samples: &Layers<D>) -> Vec<(u32, f32, usize)> {
         (0..stack.raster.texels())
             .flat_map(|texel| {
                 let range = stack.texels[texel].start as usize..stack.texels[texel + 1].start as usize;
-                samples[range]
-                    .iter()
+                range
+                    .map(|index| samples.get(index))
                     .map(move |s| (s.prim, s.depth.texels(stack.scale), texel))
             })
             .collect()
@@ -118,6 +119,47 @@ fn every_triangle_goes_to_the_direction_it_faces() {
 }
 
 #[test]
+fn samples_between_two_depths_are_those_that_a_look_at_all_finds() {
+    fn check<D: Depth>(scale: f32) {
+        let mut numbers = Numbers(8);
+        let mut lists = Vec::new();
+        let mut layers = Layers::<D>::with_capacity(0);
+        for length in 0..70 {
+            let mut depths: Vec<f32> = (0..length)
+                .map(|_| (numbers.next() * 40.0 + 45.0).round())
+                .collect();
+            depths.sort_by(f32::total_cmp);
+            let start = layers.len();
+            for depth in depths {
+                layers.push(Sample {
+                    prim: 0,
+                    depth: D::stored(depth, scale),
+                    slopes: [0; 2],
+                });
+            }
+            lists.push(start..layers.len());
+        }
+        let layers = layers.finished();
+        let mut found = 0;
+        for list in lists {
+            for _ in 0..40 {
+                let low = (numbers.next() * 45.0 + 45.0).round();
+                let high = low + (numbers.next() + 1.0).powi(4).round();
+                let near = layers.between(list.clone(), [low, high], scale);
+                let inside = |&i: &usize| (low..=high).contains(&layers.get(i).depth.texels(scale));
+                let all: Vec<usize> = list.clone().filter(inside).collect();
+                assert_eq!(near.clone().collect::<Vec<_>>(), all, "{list:?} {low} {high}");
+                found += all.len();
+            }
+        }
+        assert!(found > 2000, "{found}");
+    }
+    check::<f32>(96.0);
+    check::<u16>(96.0);
+    check::<half::f16>(96.0);
+}
+
+#[test]
 fn cells_bound_their_samples() {
     for mesh in meshes() {
         for hierarchy in [Hierarchy::Pyramid, Hierarchy::Tiles { log2: [1, 4] }] {
@@ -134,7 +176,7 @@ fn cells_bound_their_samples() {
                     let row = (tile / columns * 8 + within / 8) as u32;
                     assert_eq!(stack.raster.index(column, row), texel);
                     for level in &stack.levels {
-                        let cell = level.cell(column, row);
+                        let cell = level.cell(column >> level.shift[0], row >> level.shift[1]);
                         assert!(cell.min <= depth && depth <= cell.max);
                         assert!(cell.occupied & slots(depth, depth, 64.0 / stack.scale) != 0);
                     }

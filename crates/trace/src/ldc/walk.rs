@@ -1,19 +1,19 @@
 //! Following a ray through one direction of the cube: a 2-D DDA over cells of all levels (VMV07, ray traversal).
 //!
 //! The ray's projection walks over the raster. In a cell of a coarse level its depths in there are compared with the
-//! cell's bounds; where they meet, the walk goes on in the cells below, else it leaves for the next cell, rising a
-//! level when it leaves the cell above too. Texels with samples are given to `visit`.
+//! cell's bounds; where they meet, the cells below are walked over before the next one. Texels with samples are given to
+//! `visit`. Which of two edges a ray reaches first is a coin's toss, so a step has no branch on it.
 //!
 //! Positions are whole texels, and a cell's exit is computed from its edge, not accumulated, so the walk always
 //! advances and ends. The texels visited are those of a line within 2^-14 texels of the true one; samples reach
 //! [`super::raster::REACH`] beyond their texel. The segments of consecutive cells join without gaps.
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 use super::build::Stack;
-use super::frame::TexelRay;
-use super::levels::{Cell, Texel, coarse_slots, slots};
-use super::samples::{Depth, Sample};
+use super::frame::{Raster, TexelRay};
+use super::levels::{Cell, Level, Texel, coarse_slots, slots};
+use super::samples::{Depth, Layers};
 
 /// Receives the steps of a traversal. The implementation for `()` does nothing and compiles to nothing.
 pub trait Steps {
@@ -82,6 +82,19 @@ pub(crate) struct Segment {
 }
 
 impl Segment {
+    #[inline(always)]
+    fn of(march: &March, passage: &Passage) -> Self {
+        let t = [march.t, passage.end];
+        let (x, y) = (&march.way.x, &march.way.y);
+        let (u, v) = (f64::from(march.x.cell) + 0.5, f64::from(march.y.cell) + 0.5);
+        Self {
+            t,
+            u: [(x.at(t[0]) - u) as f32, (x.at(t[1]) - u) as f32],
+            v: [(y.at(t[0]) - v) as f32, (y.at(t[1]) - v) as f32],
+            w: passage.w,
+        }
+    }
+
     /// How far a plane's depth lies below the ray at both ends.
     #[inline(always)]
     pub(crate) fn above(&self, depth: f32, slopes: [i8; 2]) -> [f32; 2] {
@@ -96,10 +109,11 @@ impl Segment {
 struct Across {
     origin: f64,
     dir: f64,
+    /// What crossings are counted from: the origin, or what makes them infinite where the ray never leaves.
+    start: f64,
     inverse: f64,
-    /// Added to parameters: infinity where the ray never leaves.
-    never: f64,
     forward: bool,
+    step: i32,
     size: i32,
 }
 
@@ -109,9 +123,10 @@ impl Across {
         Self {
             origin,
             dir,
-            inverse: if still { 0.0 } else { 1.0 / dir },
-            never: if still { f64::INFINITY } else { 0.0 },
+            start: if still { f64::NEG_INFINITY } else { origin },
+            inverse: if still { 1.0 } else { 1.0 / dir },
             forward: dir > 0.0,
+            step: if dir > 0.0 { 1 } else { -1 },
             size: size as i32,
         }
     }
@@ -123,23 +138,60 @@ impl Across {
 
     /// Texel of the ray's point, between two.
     #[inline(always)]
-    fn texel(&self, t: f64, first: i32, end: i32) -> i32 {
-        // Casts cut off and saturate; a cell at the raster's end may reach beyond it.
-        (self.at(t) as i32).max(first).min(end.min(self.size) - 1)
+    fn texel(&self, t: f64, within: &Range<i32>) -> i32 {
+        // Casts cut off and saturate.
+        (self.at(t) as i32).max(within.start).min(within.end - 1)
     }
 
-    /// Parameter at which the ray leaves the texels from `first` to before `end`.
+    /// Parameter at which the ray crosses an edge.
     #[inline(always)]
-    fn exit(&self, first: i32, end: i32) -> f64 {
-        let edge = if self.forward { end } else { first };
-        (f64::from(edge) - self.origin) * self.inverse + self.never
+    fn crossing(&self, edge: f64) -> f64 {
+        (edge - self.start) * self.inverse
+    }
+}
+
+/// A ray's way over cells of one size along one axis.
+struct Along<'a> {
+    across: &'a Across,
+    cell: i32,
+    first: i32,
+    count: u32,
+    /// Where the ray leaves the cell.
+    edge: f64,
+    exit: f64,
+    /// From edge to edge.
+    width: f64,
+}
+
+impl<'a> Along<'a> {
+    /// From the cell at `t` over those, 2^`shift` texels wide, that the texels are in.
+    #[inline(always)]
+    fn new(across: &'a Across, t: f64, texels: &Range<i32>, shift: u32) -> Self {
+        let cell = across.texel(t, texels) >> shift;
+        let first = texels.start >> shift;
+        let edge = f64::from((cell + i32::from(across.forward)) << shift);
+        Self {
+            across,
+            cell,
+            first,
+            count: (((texels.end - 1) >> shift) - first + 1) as u32,
+            edge,
+            exit: across.crossing(edge),
+            width: f64::from(across.step << shift),
+        }
     }
 
-    /// The texel it goes to from there, if it is in the raster.
+    /// To the next cell, or not. No branch: nobody could guess it.
     #[inline(always)]
-    fn next(&self, first: i32, end: i32) -> Option<i32> {
-        let next = if self.forward { end } else { first - 1 };
-        (0..self.size).contains(&next).then_some(next)
+    fn step(&mut self, moves: bool) {
+        self.edge += if moves { self.width } else { 0.0 };
+        self.exit = self.across.crossing(self.edge);
+        self.cell += if moves { self.across.step } else { 0 };
+    }
+
+    #[inline(always)]
+    fn outside(&self) -> bool {
+        (self.cell - self.first) as u32 >= self.count
     }
 }
 
@@ -157,17 +209,6 @@ fn occupied(texel: &Texel, [a, b]: [f32; 2], reach: f32, per_texel: f32) -> bool
     passed & texel.occupied != 0
 }
 
-/// Those of a texel's samples that may lie within reach of the ray's depths.
-#[inline(always)]
-fn within<D: Depth>(list: &[Sample<D>], [a, b]: [f32; 2], reach: f32, scale: f32) -> &[Sample<D>] {
-    let (low, high) = (a.min(b) - reach, a.max(b) + reach);
-    let from = list.partition_point(|sample| sample.depth.texels(scale) < low);
-    let list = &list[from..];
-    // These are few.
-    let beyond = list.iter().position(|sample| sample.depth.texels(scale) > high);
-    &list[..beyond.unwrap_or(list.len())]
-}
-
 /// How far from the ray something may be that counts, in texels of depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
@@ -179,86 +220,213 @@ pub(crate) struct Reach {
     pub(crate) sample: f32,
 }
 
+/// A ray over a raster: its projection and its depth.
+struct Way {
+    x: Across,
+    y: Across,
+    /// Depth at 0 and its change.
+    depth: [f64; 2],
+}
+
+impl Way {
+    fn new(raster: &Raster, ray: &TexelRay) -> Self {
+        let (origin, dir) = (raster.turned(ray.origin), raster.turned(ray.dir));
+        Self {
+            x: Across::new(origin.x, dir.x, raster.size[0]),
+            y: Across::new(origin.y, dir.y, raster.size[1]),
+            depth: [origin.z, dir.z],
+        }
+    }
+
+    #[inline(always)]
+    fn depth_at(&self, t: f64) -> f32 {
+        (self.depth[0] + t * self.depth[1]) as f32
+    }
+}
+
+/// Where a ray is among the cells of one size in a rectangle of texels.
+struct March<'a> {
+    way: &'a Way,
+    x: Along<'a>,
+    y: Along<'a>,
+    t: f64,
+    depth: f32,
+}
+
+/// A ray's way through a cell, up to the end of the ray at most.
+struct Passage {
+    /// Whether it goes on to another row, not to another column.
+    sideways: bool,
+    exit: f64,
+    end: f64,
+    /// Depths at either end.
+    w: [f32; 2],
+}
+
+impl<'a> March<'a> {
+    #[inline(always)]
+    fn new(way: &'a Way, t: f64, [columns, rows]: &[Range<i32>; 2], [sx, sy]: [u32; 2]) -> Self {
+        Self {
+            way,
+            x: Along::new(&way.x, t, columns, sx),
+            y: Along::new(&way.y, t, rows, sy),
+            t,
+            depth: way.depth_at(t),
+        }
+    }
+
+    #[inline(always)]
+    fn passage(&self, t_end: f64) -> Passage {
+        let sideways = self.y.exit < self.x.exit;
+        // Rounding must not turn a segment around.
+        let exit = larger(if sideways { self.y.exit } else { self.x.exit }, self.t);
+        let end = smaller(exit, t_end);
+        Passage {
+            sideways,
+            exit,
+            end,
+            w: [self.depth, self.way.depth_at(end)],
+        }
+    }
+
+    /// Goes on to the next cell, if the rectangle has one.
+    #[inline(always)]
+    fn goes_on(&mut self, passage: &Passage) -> bool {
+        (self.t, self.depth) = (passage.exit, passage.w[1]);
+        self.x.step(!passage.sideways);
+        self.y.step(passage.sideways);
+        !(self.x.outside() | self.y.outside())
+    }
+}
+
+/// What a walk through one direction looks at.
+struct Search<'a, D> {
+    stack: &'a Stack,
+    samples: &'a Layers<D>,
+    way: Way,
+    reach: Reach,
+    /// 64 over the cube's size.
+    per_texel: f32,
+}
+
+impl<D: Depth> Search<'_, D> {
+    /// Walks over the cells of the first of these levels within a rectangle of texels, from `t` on, and through those
+    /// whose samples the ray may meet. Breaks where the ray ends.
+    fn cells(
+        &self,
+        levels: &[Level],
+        t: f64,
+        texels: &[Range<i32>; 2],
+        t_end: &mut f64,
+        steps: &mut impl Steps,
+        visit: &mut impl FnMut(Range<usize>, &Segment, &mut f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let Some((level, below)) = levels.split_first() else {
+            return self.texels(t, texels, t_end, steps, visit);
+        };
+        let [sx, sy] = level.shift;
+        let mut march = March::new(&self.way, t, texels, level.shift);
+        loop {
+            steps.cell();
+            let passage = march.passage(*t_end);
+            let (column, row) = (march.x.cell, march.y.cell);
+            let cell = level.cell(column as u32, row as u32);
+            if meets(cell, passage.w, self.reach.cell, self.per_texel) {
+                // A cell at the raster's end may reach beyond it.
+                let inner = [
+                    column << sx..((column + 1) << sx).min(self.way.x.size),
+                    row << sy..((row + 1) << sy).min(self.way.y.size),
+                ];
+                self.cells(below, march.t, &inner, t_end, steps, visit)?;
+            }
+            if passage.exit > *t_end {
+                return ControlFlow::Break(());
+            }
+            if !march.goes_on(&passage) {
+                return ControlFlow::Continue(());
+            }
+        }
+    }
+
+    /// The same over texels.
+    #[inline(always)]
+    fn texels(
+        &self,
+        t: f64,
+        texels: &[Range<i32>; 2],
+        t_end: &mut f64,
+        steps: &mut impl Steps,
+        visit: &mut impl FnMut(Range<usize>, &Segment, &mut f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut march = March::new(&self.way, t, texels, [0; 2]);
+        loop {
+            steps.texel();
+            let passage = march.passage(*t_end);
+            let index = self.stack.raster.index(march.x.cell as u32, march.y.cell as u32);
+            let texel = &self.stack.texels[index];
+            if occupied(texel, passage.w, self.reach.texel, 0.5 * self.per_texel) {
+                let list = texel.start as usize..self.stack.texels[index + 1].start as usize;
+                let near = self.within(list, passage.w);
+                if !near.is_empty() {
+                    steps.samples(near.len());
+                    visit(near, &Segment::of(&march, &passage), t_end)?;
+                }
+            }
+            if passage.exit > *t_end {
+                return ControlFlow::Break(());
+            }
+            if !march.goes_on(&passage) {
+                return ControlFlow::Continue(());
+            }
+        }
+    }
+
+    /// Those of a texel's samples that may lie within reach of the ray's depths.
+    #[inline(always)]
+    fn within(&self, list: Range<usize>, [a, b]: [f32; 2]) -> Range<usize> {
+        let depths = [a.min(b) - self.reach.sample, a.max(b) + self.reach.sample];
+        self.samples.between(list, depths, self.stack.scale)
+    }
+}
+
 /// Calls `visit` with the samples within reach in every texel the ray passes over, texels in order along the ray, until
 /// it breaks. `visit` may shorten the ray through its last argument.
 ///
-/// Samples of a texel are sorted by depth, so those within reach are found by halving: a texel of a wall seen along its
-/// length has hundreds.
+/// Samples of a texel are sorted by depth, so those within reach are found without a look at the others: a texel of a
+/// wall seen along its length has hundreds.
 #[inline(always)]
 pub(crate) fn walk<D: Depth>(
     stack: &Stack,
-    samples: &[Sample<D>],
+    samples: &Layers<D>,
     ray: &TexelRay,
     t_end: &mut f64,
     reach: Reach,
     steps: &mut impl Steps,
-    mut visit: impl FnMut(&[Sample<D>], &Segment, &mut f64) -> ControlFlow<()>,
+    mut visit: impl FnMut(Range<usize>, &Segment, &mut f64) -> ControlFlow<()>,
 ) {
-    let raster = stack.raster;
-    let (origin, dir) = (raster.turned(ray.origin), raster.turned(ray.dir));
-    let x = Across::new(origin.x, dir.x, raster.size[0]);
-    let y = Across::new(origin.y, dir.y, raster.size[1]);
-    let depth_at = |t: f64| (origin.z + t * dir.z) as f32;
-    let levels = &stack.levels[..];
-    let per_texel = 64.0 / stack.scale;
-    let mut t = ray.t_min;
-    let (mut column, mut row) = (x.texel(t, 0, x.size), y.texel(t, 0, y.size));
-    let mut depth = 0;
-    while t <= *t_end {
-        let level = levels.get(depth);
-        let [sx, sy] = level.map_or([0; 2], |level| level.shift);
-        let (left, top) = (column >> sx << sx, row >> sy << sy);
-        let (right, bottom) = (left + (1 << sx), top + (1 << sy));
-        let (exit_x, exit_y) = (x.exit(left, right), y.exit(top, bottom));
-        let sideways = exit_y < exit_x;
-        // Rounding must not turn a segment around.
-        let exit = if sideways { exit_y } else { exit_x }.max(t);
-        let end = exit.min(*t_end);
-        let w = [depth_at(t), depth_at(end)];
-        if let Some(level) = level {
-            steps.cell();
-            if meets(level.cell(column as u32, row as u32), w, reach.cell, per_texel) {
-                depth += 1;
-                continue;
-            }
-        } else {
-            steps.texel();
-            let index = raster.index(column as u32, row as u32);
-            let near = if occupied(&stack.texels[index], w, reach.texel, 0.5 * per_texel) {
-                let list = stack.texels[index].start as usize..stack.texels[index + 1].start as usize;
-                within(&samples[list], w, reach.sample, stack.scale)
-            } else {
-                &[]
-            };
-            if !near.is_empty() {
-                steps.samples(near.len());
-                let (u, v) = (f64::from(column) + 0.5, f64::from(row) + 0.5);
-                let segment = Segment {
-                    t: [t, end],
-                    u: [(x.at(t) - u) as f32, (x.at(end) - u) as f32],
-                    v: [(y.at(t) - v) as f32, (y.at(end) - v) as f32],
-                    w,
-                };
-                if visit(near, &segment, t_end).is_break() {
-                    return;
-                }
-            }
-        }
-        if exit > *t_end {
-            return;
-        }
-        let from = (column, row);
-        let next = if sideways {
-            y.next(top, bottom).map(|next| (x.texel(exit, left, right), next))
-        } else {
-            x.next(left, right).map(|next| (next, y.texel(exit, top, bottom)))
-        };
-        let Some(to) = next else { return };
-        (column, row) = to;
-        t = exit;
-        if depth > 0 {
-            let [sx, sy] = levels[depth - 1].shift;
-            depth -= usize::from((from.0 ^ column) >> sx != 0 || (from.1 ^ row) >> sy != 0);
-        }
+    if ray.t_min > *t_end {
+        return;
     }
+    let search = Search {
+        stack,
+        samples,
+        way: Way::new(&stack.raster, ray),
+        reach,
+        per_texel: 64.0 / stack.scale,
+    };
+    let all = [0..search.way.x.size, 0..search.way.y.size];
+    // Whether the ray ended in the raster or left it is all the same.
+    let _ = search.cells(&stack.levels, ray.t_min, &all, t_end, steps, &mut visit);
+}
+
+/// The larger of two numbers, none if either is none.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
