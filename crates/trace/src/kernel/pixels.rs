@@ -354,12 +354,8 @@ fn project_receivers_impl<S: Simd>(
             exact_halves(simd, rays, light, block, t)
         };
         let of_face = faces_of(simd, faces, &halves, u32::from(asked));
-        for face in Bits(
-            of_face
-                .iter()
-                .rev()
-                .fold(0, |bits, &lanes| bits << 1 | u32::from(lanes != 0)),
-        ) {
+        let any = |bits, &lanes: &u32| bits << 1 | u32::from(lanes != 0);
+        for face in Bits(of_face.iter().rev().fold(0, any)) {
             let lanes = of_face[face];
             let view = &faces.views[face];
             let mut projected = project_block(simd, view, &halves);
@@ -412,7 +408,12 @@ impl Quick {
             *nearest = match view.arrangement {
                 // Part of the error is in proportion to the distance of the point.
                 Arrangement::Perspective if allowed > 64.0 => (allowed * 0.5 / coordinates) as f32,
-                Arrangement::Parallel { reach } if allowed > coordinates + reach + beside => f32::INFINITY,
+                Arrangement::Parallel { reach } => {
+                    let far = coordinates + reach + beside;
+                    // Nearness is off by a share of `far`, which its band must hold, too.
+                    let good = allowed > far && reach * 2f64.powi(24) > far;
+                    if good { f32::INFINITY } else { 0.0 }
+                }
                 _ => 0.0,
             };
         }
