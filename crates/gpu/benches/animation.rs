@@ -11,8 +11,11 @@
 //!
 //! Run as a test it does little.
 
+mod common;
+
 use std::time::Instant;
 
+use common::{Start, start};
 use rayward::CameraFrame;
 use rayward_gpu::trace::{Bvh, Ldc, LdcOptions, Receiver, SurfaceRay, Triangles, View, exact, ldc};
 use rayward_gpu::{Cube, CubeOptions, Gpu, GpuBvh, GpuSkin, StillCube, TraceStats};
@@ -22,26 +25,19 @@ use rayward_scene::{FrameGeometry, Scene, default_camera};
 const WARM: usize = 2;
 
 fn main() {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("one pool");
-    let test = !std::env::args().any(|a| a == "--bench");
-    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let name = words.iter().find(|word| word.parse::<usize>().is_err());
-    let name = name.map_or("courtyard", String::as_str);
-    let asked = words.iter().find_map(|word| word.parse().ok());
+    let Start {
+        test,
+        names,
+        count,
+        gpu,
+    } = start();
+    let name = names.first().map_or("courtyard", String::as_str);
     let (name, resolutions, rays, frames): (_, &[u32], _, _) = if test {
         ("walker", &[64], 100, 4)
     } else {
-        (name, &[512, 1024], asked.unwrap_or(10_000), 9)
+        (name, &[512, 1024], count.unwrap_or(10_000), 9)
     };
     let scene = rayward_scene::builtin::build(name).expect("a built-in scene");
-    let gpu = Gpu::open(None);
-    match &gpu {
-        Ok(gpu) => println!("GPU: {}, {}", gpu.adapter().name, gpu.adapter().driver),
-        Err(problem) => println!("GPU: {problem}"),
-    }
     for &resolution in resolutions {
         animated(&scene, resolution, rays, frames, gpu.as_ref().ok());
     }

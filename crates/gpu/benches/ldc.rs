@@ -13,9 +13,12 @@
 //!
 //! Built-in scenes always; the meshes of `RAYWARD_SCENES` where it is set. Run as a test it does little.
 
+mod common;
+
 use std::collections::{HashMap, HashSet};
 use std::time::Instant;
 
+use common::{Start, start};
 use glam::{DVec3, Vec3};
 use rayward::CameraFrame;
 use rayward_gpu::trace::ldc::{Coverage, DepthFormat, Hierarchy, HitTest, LdcBuild, StepCounts, Steps, TILE};
@@ -24,17 +27,12 @@ use rayward_gpu::{Cube, CubeOptions, Gpu, GpuBvh, GpuGrid, GridGeometry, TraceSt
 use rayward_scene::{FrameGeometry, LoadOptions, default_camera, default_lights};
 
 fn main() {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("one pool");
-    let test = !std::env::args().any(|a| a == "--bench");
-    let words: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let count = words.iter().find_map(|word| word.parse().ok());
-    let named: Vec<String> = words
-        .into_iter()
-        .filter(|w| w.parse::<usize>().is_err())
-        .collect();
+    let Start {
+        test,
+        names,
+        count,
+        gpu,
+    } = start();
     let (resolutions, rays): (&[u32], usize) = if test {
         (&[64], 300)
     } else {
@@ -42,16 +40,11 @@ fn main() {
     };
     let names = if test {
         vec!["blob-1k".into()]
-    } else if named.is_empty() {
+    } else if names.is_empty() {
         scenes()
     } else {
-        named
+        names
     };
-    let gpu = Gpu::open(None);
-    match &gpu {
-        Ok(gpu) => println!("GPU: {}, {}", gpu.adapter().name, gpu.adapter().driver),
-        Err(problem) => println!("GPU: {problem}"),
-    }
     for name in names {
         let geometry = load(&name);
         for &resolution in resolutions {

@@ -1,12 +1,15 @@
 //! What shading costs on the CPU and on a GPU, by itself and in whole frames.
 //!
-//! `cargo bench -p rayward-gpu --bench shading [-- SCENE...]`. For each scene: surfaces of all that the camera sees, then the
+//! `cargo bench -p rayward-gpu --bench shading [-- SCENE... WIDTH]`. For each scene: surfaces of all that the camera sees, then the
 //! light of its lights on them, 65,536 points at a time as the device takes them; then a frame with all rays on the device,
 //! shaded by either. One thread; times are medians of [`RUNS`], both ways in turn. Run as a test it does little.
+
+mod common;
 
 use std::sync::Arc;
 use std::time::Instant;
 
+use common::{Start, start};
 use glam::Vec3;
 use rayward::scene::{FrameGeometry, builtin, default_camera, default_lights};
 use rayward::shade::object_of;
@@ -15,32 +18,32 @@ use rayward::{
     Beam, CameraFrame, CpuShading, RenderOptions, Renderer, Shader, ShadingBuilder, ShadingLight, Source,
     Surface, SurfacePoint, SurfaceShader, triangles,
 };
-use rayward_gpu::{CubeOptions, Gpu, GpuSecondary, GpuShading};
+use rayward_gpu::{CubeOptions, GpuSecondary, GpuShading};
 
 /// How often each is measured.
 const RUNS: usize = 5;
 
 fn main() {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build_global()
-        .expect("one pool");
-    let test = !std::env::args().any(|a| a == "--bench");
-    let named: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
-    let names = match (test, named.is_empty()) {
+    let Start {
+        test,
+        names,
+        count,
+        gpu,
+    } = start();
+    let names = match (test, names.is_empty()) {
         (true, _) => vec!["blob-1k".to_owned()],
         (_, true) => ["courtyard", "office", "conference"].map(str::to_owned).into(),
-        _ => named,
+        _ => names,
     };
-    let gpu = match Gpu::open(None) {
-        Ok(gpu) => gpu,
-        Err(problem) => return println!("GPU: {problem}"),
-    };
-    println!("GPU: {}, {}", gpu.adapter().name, gpu.adapter().driver);
+    let Ok(gpu) = gpu else { return };
     let device = Arc::new(GpuSecondary::new(gpu, CubeOptions::default()));
-    let (width, height) = if test { (64, 48) } else { (960, 600) };
+    let width = if test {
+        64
+    } else {
+        count.map_or(960, |width| width as u32)
+    };
     for name in names {
-        measure(&device, &name, [width, height]);
+        measure(&device, &name, [width, (width * 5 / 8).max(1)]);
     }
 }
 

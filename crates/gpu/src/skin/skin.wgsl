@@ -20,10 +20,20 @@ struct Influence {
 @group(0) @binding(4) var<storage, read_write> posed: array<f32>;
 @group(0) @binding(5) var<storage, read_write> texels: array<f32>;
 
+// Which vertex an invocation has; there may be more of them than vertices.
+struct Invocation {
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) local: u32,
+}
+
+fn vertex(invocation: Invocation) -> u32 {
+    return (invocation.group.y * invocation.groups.x + invocation.group.x) * 64u + invocation.local;
+}
+
 @compute @workgroup_size(64)
-fn pose(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-        @builtin(local_invocation_index) local: u32) {
-    let v = (group.y * groups.x + group.x) * 64u + local;
+fn pose(invocation: Invocation) {
+    let v = vertex(invocation);
     if v >= skin.vertices {
         return;
     }
@@ -47,9 +57,8 @@ fn pose(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: ve
 }
 
 @compute @workgroup_size(64)
-fn to_texels(@builtin(workgroup_id) group: vec3u, @builtin(num_workgroups) groups: vec3u,
-             @builtin(local_invocation_index) local: u32) {
-    let v = (group.y * groups.x + group.x) * 64u + local;
+fn to_texels(invocation: Invocation) {
+    let v = vertex(invocation);
     if v >= skin.vertices {
         return;
     }
