@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::args::{AnimateArgs, FrameArgs, TargetArgs};
 use crate::failure::{Code, Failure};
-use crate::gpu::Device;
+use crate::gpu::{Device, DeviceSummary};
 use crate::input::{self, Input};
 use crate::machine;
 use crate::output::Targets;
@@ -39,6 +39,8 @@ struct FrameReport {
     trace_ms: f64,
     write_ms: f64,
     peak_memory_bytes: Option<u64>,
+    /// What a GPU did up to here, if frames are made on one.
+    gpu: Option<DeviceSummary>,
 }
 
 /// What all frames share.
@@ -49,6 +51,7 @@ struct Job<'a> {
     frames: Span<u32>,
     options: RenderOptions,
     renderer: Renderer<'a>,
+    device: Device,
     geometry: FrameGeometry,
 }
 
@@ -104,6 +107,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         frames,
         options,
         renderer,
+        device,
         geometry: FrameGeometry::default(),
     };
     if movie {
@@ -116,7 +120,7 @@ pub(crate) fn run(args: &AnimateArgs) -> Result<(), Failure> {
         }
     }
     drop(bar);
-    device.close(args.run.quiet)?;
+    job.device.close(args.run.quiet)?;
     if !args.run.quiet {
         let there = (frames.end - frames.start) as usize - wanted.len();
         report::note(&format!(
@@ -168,7 +172,10 @@ impl Job<'_> {
         if args.run.json {
             let write_ms = milliseconds(writing.elapsed());
             let time = f64::from(frame) / args.frames.rate;
-            let report = FrameReport::new(frame, time, &files, &rendered.stats, pose_ms, write_ms);
+            let report = FrameReport {
+                gpu: self.device.summary(),
+                ..FrameReport::new(frame, time, &files, &rendered.stats, pose_ms, write_ms)
+            };
             report::to_stdout_json_line(&report)?;
         }
         Ok(())
@@ -235,6 +242,7 @@ impl FrameReport {
             trace_ms: milliseconds(stats.trace),
             write_ms,
             peak_memory_bytes: machine::peak_memory(),
+            gpu: None,
         }
     }
 }

@@ -71,6 +71,39 @@ fn frames_are_shaded_on_the_device_and_say_so() {
 }
 
 #[test]
+fn frames_of_animations_tell_what_the_device_did_up_to_them() {
+    let folder = Folder::new();
+    let walker = [
+        "animate",
+        "--builtin",
+        "walker",
+        "--resolution",
+        "24x16",
+        "--json",
+    ];
+    let frames = ["--rate", "4", "--frames", "0..2", "-o", "f#.png"];
+    let lines = |more: &[&str]| -> Vec<serde_json::Value> {
+        let run = folder.run(&[&walker[..], &frames, more].concat()).expect(0);
+        let lines = std::str::from_utf8(&run.stdout).expect("text").lines();
+        lines
+            .map(|line| serde_json::from_str(line).expect("an object a line"))
+            .collect()
+    };
+    assert!(lines(&[]).iter().all(|frame| frame["gpu"].is_null()));
+    let doctor = folder.run(&["doctor", "--json"]).expect(0).json();
+    if doctor["gpu"]["used"].is_null() {
+        return;
+    }
+    let on_gpu = lines(&["--gpu"]);
+    let rays: Vec<_> = on_gpu.iter().map(|frame| frame["gpu"]["rays"].as_u64()).collect();
+    let [Some(first), Some(second)] = rays[..] else {
+        panic!("{rays:?}")
+    };
+    assert!(first > 0 && second > first, "{first} {second}");
+    assert_eq!(on_gpu[0]["gpu"]["adapter"], doctor["gpu"]["used"]);
+}
+
+#[test]
 fn a_missing_gpu_is_an_error_or_said() {
     let folder = Folder::new();
     if cfg!(target_os = "linux") {
