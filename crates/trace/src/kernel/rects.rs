@@ -91,7 +91,7 @@ fn find_batch<S: Simd>(simd: S, size: [u32; 2], used: u32, corners: &VertexLanes
     let mut seen = known;
     for (axis, lanes) in [&corners.x, &corners.y].into_iter().enumerate() {
         let [first, last] = pixel_range(simd, load3(simd, lanes), size[axis]);
-        seen = seen & first.simd_le(last);
+        seen &= first.simd_le(last);
         first.to_int::<i32x16<S>>().store_slice(&mut batch.pixels[axis]);
         last.to_int::<i32x16<S>>()
             .store_slice(&mut batch.pixels[axis + 2]);
