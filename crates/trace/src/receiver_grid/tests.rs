@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::*;
 use crate::kernel::casters::{CasterLanes, LightRaster, sift_casters};
 use crate::kernel::pixels::{Asking, LightFaces, TileRays, project_receivers};
+use crate::kernel::planes::find_planes;
 use crate::test_meshes::{Mesh, Numbers, axes, looking};
 use crate::{Accel, BruteForce, Casts, EyeGrid, EyeGridOptions, Receiver};
 
@@ -442,4 +443,42 @@ fn receivers_lie_where_their_rounded_points_do() {
         }
     }
     assert!(seen > 3000, "{seen}");
+}
+
+/// Sides that lanes of f64 are sure of are those of the exact decision, also next to a triangle's plane.
+#[test]
+fn sides_of_planes_are_those_of_the_exact_decision() {
+    let mut numbers = Numbers(21);
+    let (mut known, mut all) = (0, 0);
+    for scale in [1.0, 1e4, 1e-3] {
+        for _ in 0..400 {
+            let offset = numbers.point() * scale * 50.0;
+            let mut places = [[[0.0; 4]; 16]; 3];
+            let corners = [(); 16].map(|()| [(); 3].map(|()| numbers.point() * scale + offset));
+            for (lane, corner) in (0..16).flat_map(|lane| (0..3).map(move |corner| (lane, corner))) {
+                places[corner][lane] = corners[lane][corner].extend(0.0).to_array();
+            }
+            // A point of the first triangle, as far as f32 has it, and a direction along its plane.
+            let [a, b, c] = corners[0];
+            let ends = [
+                Light::Point(a + (b - a) * 0.3 + (c - a) * numbers.next()),
+                Light::Directional(b - a),
+            ];
+            let center = numbers.point().as_dvec3();
+            for level in SimdLevel::available() {
+                let (_, sides) = find_planes(level, center, &places, [&ends[0], &ends[1]]);
+                for (lane, corners) in corners.iter().enumerate() {
+                    for (sides, end) in sides.iter().zip(&ends) {
+                        all += 1;
+                        if let Some(front) = sides.front(lane) {
+                            known += 1;
+                            let side = exact::side(*corners, end);
+                            assert!(side != 0.0 && (side > 0.0) == front, "{corners:?} {end:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(known * 100 > all * 90 && known < all, "{known} of {all}");
 }
