@@ -75,7 +75,9 @@ impl FaceScene<'_> {
             bad &= bad - 1;
             let prim = vertices.prim[lane];
             if let Some(precise) = PreciseTriangle::new(self.view, self.triangles.corners(prim)) {
-                let reach = f64::from(2 * LIGHT_TILE);
+                // Twice as far as receivers lie, for they are rounded themselves: by half an ulp of the raster's size, and by
+                // QUICK_ERROR.
+                let reach = f64::from(4 * LIGHT_TILE);
                 let record = precise.record(prim, corner.map(f64::from), reach);
                 let area = CasterArea::of_lane(vertices, lane, corner);
                 draw_caster(self.level, receivers, &record, &area, self.points);
